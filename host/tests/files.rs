@@ -61,8 +61,8 @@ fn no_command_replaces_a_file_unless_it_is_forced() {
     std::fs::write(at.join("there.png"), "precious").unwrap();
     for (line, file) in [
         ("learn demo.csv --name a -o there".to_owned(), "there"),
-        (format!("{DEVICE} record --duration 0.1 -o there"), "there"),
-        (format!("{DEVICE} teach --duration 0.1 -o there"), "there"),
+        (format!("{DEVICE} record --duration 0.2 -o there"), "there"),
+        (format!("{DEVICE} teach --duration 0.2 -o there"), "there"),
         (format!("{DEVICE} run reach.toml --record there"), "there"),
         (format!("{DEVICE} run reach.toml --bus-log there"), "there"),
         (format!("{DEVICE} rehearse reach.toml --trials 1 -o there"), "there"),
@@ -89,7 +89,7 @@ fn h14_an_output_that_is_an_input_a_device_or_a_folder_is_refused_even_when_forc
         ("learn demo.csv --name a -o ./demo.csv --force".to_owned(), "E232"),
         ("statistics reach.toml demo.csv -o demo.csv --force".to_owned(), "E232"),
         (format!("{DEVICE} run reach.toml --record reach.toml --force"), "E232"),
-        (format!("{DEVICE} record --duration 0.1 -o /dev/null --force"), "E231"),
+        (format!("{DEVICE} record --duration 0.2 -o /dev/null --force"), "E231"),
         (format!("{DEVICE} run reach.toml --bus-log /dev/null --force"), "E231"),
         ("learn demo.csv --name a -o . --force".to_owned(), "E231"),
         ("learn demo.csv --name a -o nowhere/a.toml".to_owned(), "E233"),
@@ -100,6 +100,35 @@ fn h14_an_output_that_is_an_input_a_device_or_a_folder_is_refused_even_when_forc
     }
     assert_eq!(std::fs::read(at.join("demo.csv")).unwrap(), demonstration);
     assert_eq!(names(at), ["demo.csv", "reach.toml"]);
+}
+
+#[test]
+fn h14_a_file_that_is_named_twice_as_an_output_or_as_a_log_is_refused_before_anything_is_written() {
+    let folder = learned(2.0);
+    let at = folder.path();
+    tactus(at, "--device sil:world=simple,flash=arm.flash list").success();
+    std::fs::write(at.join("there.png"), "precious").unwrap();
+    std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/faults/a3.toml"), at.join("a3.toml")).unwrap();
+    std::fs::write(at.join("short.flash"), "no flash").unwrap();
+    let content = || -> Vec<Vec<u8>> { names(at).iter().map(|name| std::fs::read(at.join(name)).unwrap()).collect() };
+    let (there, before) = (names(at), content());
+    for line in [
+        "plot -d demo.csv -o new.png -o new.png".to_owned(),
+        "plot -d demo.csv -o there.png -o ./there.png --force".to_owned(),
+        "plot -r demo.csv -o new.png --picture new.png".to_owned(),
+        format!("{DEVICE} run reach.toml --record new.csv --bus-log ./new.csv"),
+        format!("{DEVICE} run reach.toml --bus-log reach.toml --force"),
+        "--device sil:world=simple,bus=reach.toml run reach.toml --force".to_owned(),
+        "--device sil:world=simple,bus=arm.flash,flash=arm.flash list --force".to_owned(),
+        "--device sil:world=simple,bus=a3.toml,faults=a3.toml:2 list --force".to_owned(),
+    ] {
+        let refused = tactus(at, &line).failure().code(2);
+        assert!(stderr(&refused).starts_with("error[E232]"), "{line}: {}", stderr(&refused));
+    }
+    // A simulation that does not start replaces no log.
+    tactus(at, "--device sil:world=simple,bus=there.png,flash=short.flash list --force").failure().code(2);
+    assert_eq!(names(at), there);
+    assert!(content() == before, "a file has changed");
 }
 
 #[test]

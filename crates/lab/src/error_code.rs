@@ -115,7 +115,7 @@ error_codes! {
     CommandLine = 200: "the command line is wrong", "a misspelt option, or one that is missing",
         "`tactus COMMAND --help` shows what it takes";
     AddressInvalid = 201: "the address of the device cannot be read", "a misspelt `--device`",
-        "for a simulated arm use `--device sim:`";
+        "correct the address; `tactus --help` lists the devices";
     NoDeviceNamed = 202: "no device is named", "neither `--device` nor TACTUS_DEVICE is given",
         "add `--device sim:` for a simulated arm, or `--device serial:/dev/ttyACM0`, or set TACTUS_DEVICE";
     UnknownWorld = 203: "there is no simulated world of that name", "a misspelt `world=`",
@@ -160,7 +160,7 @@ error_codes! {
         "choose another name; `--force` replaces it";
     OutputNotAFile = 231: "the place of the file to be written is taken by something else",
         "a folder, a device, a pipe, or a link to nothing", "name a file";
-    OutputIsInput = 232: "the file to be written is one that the command reads", "the same file is named twice",
+    OutputIsInput = 232: "the file to be written is one that the command reads, or writes already", "the same file is named twice",
         "name another file for the output";
     FileMissing = 233: "a file or folder does not exist", "a misspelt name", "check the name; `ls` lists what is there";
     FileNotPermitted = 234: "the system does not permit the use of a file or folder",

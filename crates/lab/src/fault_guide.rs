@@ -64,7 +64,8 @@ impl FaultGuide {
             ),
             Fault::ContactForce => (
                 "the hand or what it holds has struck something",
-                "the wrench in the record says from where; look for an obstacle, and tare if nothing was there",
+                "the wrench in the record says from where; look for an obstacle; if there was none, bring the arm home and \
+                 zero it again (`--at-home`): that tares its sensor",
             ),
             Fault::SafetyDropped => (
                 "the emergency stop or the idle button was pressed, or the safety module found a limit exceeded",

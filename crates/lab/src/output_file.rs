@@ -1,6 +1,6 @@
 //! A file that a command writes: opened before anything moves, filled beside its place, put there when it is whole.
 
-use std::fs::{self, File, Metadata, OpenOptions};
+use std::fs::{self, File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -35,6 +35,12 @@ pub enum OutputError {
         /// The file.
         file: PathBuf,
     },
+    /// The command writes it a second time.
+    #[error("{file} is to be written twice by this command", file = file.display())]
+    Twice {
+        /// The file.
+        file: PathBuf,
+    },
     /// The operating system refuses.
     #[error("{file}: cannot be written: {cause}", file = file.display())]
     System {
@@ -53,7 +59,7 @@ impl OutputError {
         match self {
             Self::Exists { .. } => ErrorCode::WouldReplace,
             Self::NotAFile { .. } => ErrorCode::OutputNotAFile,
-            Self::IsInput { .. } => ErrorCode::OutputIsInput,
+            Self::IsInput { .. } | Self::Twice { .. } => ErrorCode::OutputIsInput,
             Self::System { cause, .. } => ErrorCode::of_file(cause).unwrap_or(ErrorCode::FileFailed),
         }
     }
@@ -88,10 +94,7 @@ impl OutputFile {
         let system = |cause| OutputError::System { file: target.to_owned(), cause };
         let (place, before) = inspect(target)?;
         if let Some(before) = &before {
-            let same = |input: &&Path| fs::metadata(input).is_ok_and(|input| is_same(&input, before));
-            if inputs.iter().any(same) {
-                return Err(OutputError::IsInput { file: target.to_owned() });
-            }
+            refuse_inputs(target, before, inputs)?;
             if !force {
                 return Err(OutputError::Exists { file: target.to_owned() });
             }
@@ -167,16 +170,49 @@ impl Drop for OutputFile {
     }
 }
 
+/// Refuses files that one command is to write and that are the same, by whatever names.
+///
+/// # Errors
+/// [`OutputError::Twice`]
+pub fn apart<'a>(targets: impl IntoIterator<Item = &'a Path>) -> Result<(), OutputError> {
+    let mut places = Vec::new();
+    for target in targets {
+        // Of a file that is not there yet its folder may be.
+        let place = target.canonicalize().ok().or_else(|| {
+            let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            Some(folder.canonicalize().ok()?.join(target.file_name()?))
+        });
+        let place = place.unwrap_or_else(|| target.to_owned());
+        if places.contains(&place) {
+            return Err(OutputError::Twice { file: target.to_owned() });
+        }
+        places.push(place);
+    }
+    Ok(())
+}
+
 /// A log that grows at its place, so that others can read it meanwhile.
 ///
 /// # Errors
-/// [`OutputError`]; an existing regular file is replaced only with `force`.
-pub fn create_log(target: &Path, force: bool) -> Result<File, OutputError> {
+/// [`OutputError`]; an existing regular file is replaced only with `force`, and none of `inputs` ever is.
+pub fn create_log(target: &Path, force: bool, inputs: &[&Path]) -> Result<File, OutputError> {
     let (place, before) = inspect(target)?;
-    if before.is_some() && !force {
-        return Err(OutputError::Exists { file: target.to_owned() });
+    if let Some(before) = &before {
+        refuse_inputs(target, before, inputs)?;
+        if !force {
+            return Err(OutputError::Exists { file: target.to_owned() });
+        }
     }
-    File::create(place).map_err(|cause| OutputError::System { file: target.to_owned(), cause })
+    let opened = OpenOptions::new().write(true).create(true).truncate(false).open(place).and_then(|file| {
+        // Two programs at one log would each write over the other's lines.
+        file.try_lock().map_err(|cause| match cause {
+            TryLockError::WouldBlock => io::Error::new(io::ErrorKind::ResourceBusy, "another program writes it"),
+            TryLockError::Error(cause) => cause,
+        })?;
+        file.set_len(0)?;
+        Ok(file)
+    });
+    opened.map_err(|cause| OutputError::System { file: target.to_owned(), cause })
 }
 
 /// Writes a whole file in one piece: a reader sees the old content or the new, never half of it.
@@ -216,6 +252,11 @@ fn inspect(target: &Path) -> Result<(PathBuf, Option<Metadata>), OutputError> {
         }
         Err(cause) => Err(OutputError::System { file: target.to_owned(), cause }),
     }
+}
+
+fn refuse_inputs(target: &Path, before: &Metadata, inputs: &[&Path]) -> Result<(), OutputError> {
+    let same = |input: &&Path| fs::metadata(input).is_ok_and(|input| is_same(&input, before));
+    if inputs.iter().any(same) { Err(OutputError::IsInput { file: target.to_owned() }) } else { Ok(()) }
 }
 
 fn is_same(one: &Metadata, other: &Metadata) -> bool {
@@ -300,6 +341,24 @@ mod tests {
         fs::set_permissions(&input, rights).unwrap();
         assert_eq!(OutputFile::create(&input, true, &[]).unwrap_err().code(), ErrorCode::FileNotPermitted);
         assert_eq!(fs::read(&input).unwrap(), b"input");
+    }
+
+    #[test]
+    fn files_of_one_command_that_are_the_same_by_other_names_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("a.png"), "").unwrap();
+        std::os::unix::fs::symlink("a.png", at("link.png")).unwrap();
+        for (one, other, is_same) in [
+            ("a.png", "link.png", true),
+            ("a.png", "./a.png", true),
+            ("new.png", "./new.png", true),
+            ("new.png", "a.png", false),
+            ("no/new.png", "no/new.png", true),
+        ] {
+            let result = apart([at(one).as_path(), at("b.png").as_path(), at(other).as_path()]);
+            assert_eq!(matches!(result, Err(OutputError::Twice { .. })), is_same, "{one} {other}");
+        }
     }
 
     #[test]

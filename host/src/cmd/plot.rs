@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, Output, files};
 use lab::demonstration::{Demonstration, Preparation, Recording};
-use lab::output_file::OutputFile;
+use lab::output_file::{self, OutputFile};
 use lab::plan;
 use lab::plot::{self, Movement, movement::PosePath};
 use lab::primitive_file::{PrimitiveFile, Provenance};
@@ -56,9 +56,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         .flatten()
         .map(PathBuf::as_path)
         .collect();
-    let create = |file: &PathBuf| files::create(file, global, &inputs, DOING);
-    let outputs = command.output.iter().map(create).collect::<Result<Vec<_>, _>>()?;
-    let picture_file = command.picture.as_ref().map(create).transpose()?;
+    let (outputs, picture_file) = open_outputs(command, global, &inputs)?;
     let mut shown = None;
     let demonstration = match &command.demonstration {
         None => None,
@@ -126,6 +124,19 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         },
         text.join("\n"),
     )
+}
+
+/// Opens the figures and the picture: each another file, and none that is read.
+fn open_outputs(
+    command: &Cmd,
+    global: &Global,
+    inputs: &[&Path],
+) -> Result<(Vec<OutputFile>, Option<OutputFile>), Failure> {
+    output_file::apart(command.output.iter().chain(&command.picture).map(PathBuf::as_path))
+        .map_err(|error| files::failure(error, DOING))?;
+    let create = |file: &PathBuf| files::create(file, global, inputs, DOING);
+    let outputs = command.output.iter().map(create).collect::<Result<Vec<_>, _>>()?;
+    Ok((outputs, command.picture.as_ref().map(create).transpose()?))
 }
 
 /// Data of `tactus --json plot`.

@@ -19,6 +19,7 @@ use lab::client::Client;
 use lab::demonstration::{Origin, RATE};
 use lab::device::Device;
 use lab::line_health::{LineHealth, Snapshot};
+use lab::output_file;
 use lab::primitive_file::PrimitiveFile;
 use lab::procedure::{
     self, Change, ChangeKind, CycleWriter, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, recording_text,
@@ -84,6 +85,8 @@ pub struct Cmd {
 /// The primitive is wrong, the device refuses, or the arm stops before the end.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
+    let outputs = command.record.iter().chain(&command.bus_log).map(PathBuf::as_path);
+    output_file::apart(outputs).map_err(|error| files::failure(error, "run refused"))?;
     let stored = stored_name(&command.primitive);
     let mut opened = stored.is_some().then(|| open(command, global)).transpose()?;
     let file = match (&stored, &mut opened) {
@@ -239,6 +242,7 @@ fn stored_name(primitive: &Path) -> Option<Name> {
 fn open(command: &Cmd, global: &Global) -> Result<Client<Device>, Failure> {
     connection::open(global, "run", |options| {
         options.bus_log = command.bus_log.clone().or(options.bus_log.take());
+        options.reads = vec![command.primitive.clone()];
     })
 }
 

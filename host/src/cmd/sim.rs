@@ -69,6 +69,15 @@ enum Listener {
     Tcp(TcpListener),
 }
 
+impl Drop for Listener {
+    fn drop(&mut self) {
+        if let Self::Unix(_, path) = self {
+            // Left behind it would only confuse the next one.
+            let _ = std::fs::remove_file(path);
+        }
+    }
+}
+
 /// Serves a simulated arm until it is interrupted.
 ///
 /// Bytes arrive when the wall clock brings them, so runs over a socket are not reproducible; `--device sim:` is.
@@ -89,36 +98,34 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         let comma = if device.ends_with(':') { "" } else { "," };
         device = format!("{device}{comma}{option}");
     }
+    let refused = |address: &str, cause: Box<dyn std::error::Error + Send + Sync>| {
+        Failure::new(ErrorCode::CannotListen, format!("sim: cannot listen on {address}"), cause)
+    };
+    // Before the device: one whose place is taken must not replace the log of the one that serves there.
+    let bus =
+        command.can.as_ref().map(|address| BusServer::listen(address).map_err(|cause| refused(address, cause.into())));
+    let mut bus = bus.transpose()?;
+    let listener = (!command.can_only)
+        .then(|| listen(&command.listen).map_err(|cause| refused(&command.listen, cause)))
+        .transpose()?;
     let (mut device, interrupt) = connection::simulated(&device, DOING, |options| {
         options.replace_logs = global.force;
         if command.can_only {
             options.engine = Engine::Absent;
         }
     })?;
-    let refused = |address: &str, cause: Box<dyn std::error::Error + Send + Sync>| {
-        Failure::new(ErrorCode::CannotListen, format!("sim: cannot listen on {address}"), cause)
-    };
-    let mut bus = None;
-    if let Some(address) = &command.can {
-        let server = BusServer::listen(address).map_err(|cause| refused(address, cause.into()))?;
+    if let (Some(address), Some(server)) = (&command.can, &bus) {
         let served = server.address().map_err(|cause| refused(address, cause.into()))?;
         if let Some(simulation) = device.simulation() {
             simulation.keep_traffic();
         }
         output.say(format!("the arm's bus is served at {served} (socketcand, interface {ARM_INTERFACE})"));
-        bus = Some(server);
     }
-    let mut listener = None;
-    if !command.can_only {
-        listener = Some(listen(&command.listen).map_err(|cause| refused(&command.listen, cause))?);
+    if listener.is_some() {
         output.say(format!("a simulated arm listens; in another terminal: `tactus --device {} list`", command.listen));
     }
     output.say(format!("the pendant's buttons, typed here: {}", pendant::WORDS));
     let served = serve(command, &mut device, listener.as_ref(), bus.as_mut(), &interrupt, output);
-    if let Some(Listener::Unix(_, path)) = &listener {
-        // Left behind it would only confuse the next one.
-        let _ = std::fs::remove_file(path);
-    }
     served.map_err(|error| lab::error::HostError::Transport(error).into_failure(DOING))?;
     let seconds = device.now().as_secs_f64();
     output.result(&Simulated { simulated_s: seconds }, format!("{seconds:.1} s simulated"))

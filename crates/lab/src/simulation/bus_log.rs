@@ -21,9 +21,9 @@ pub(super) struct BusLog {
 }
 
 impl BusLog {
-    /// Begins a file.
-    pub(super) fn create(path: &Path, replace: bool) -> Result<Self, SimulationError> {
-        let file = create_log(path, replace)?;
+    /// Begins a file; none of `inputs` is replaced.
+    pub(super) fn create(path: &Path, replace: bool, inputs: &[&Path]) -> Result<Self, SimulationError> {
+        let file = create_log(path, replace, inputs)?;
         Ok(Self { path: path.to_owned(), file: BufWriter::new(file), waiting: Vec::new() })
     }
 

@@ -4,7 +4,7 @@
 //! orders, figures and bars are for `cargo xtask faults`. Times count from the first torque on the bus that is not
 //! zero, in a scenario that begins at the power-up from there.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::input_file;
 
@@ -13,6 +13,13 @@ use sim::Plant;
 use sim::fault::Injection;
 
 use super::SimulationError;
+
+/// The file, and the number of the scenario in it.
+pub(super) fn scenario(name: &str) -> (&Path, usize) {
+    let numbered = name.rsplit_once(':').and_then(|(path, number)| Some((path, number.parse().ok()?)));
+    let (path, number) = numbered.unwrap_or((name, 1));
+    (Path::new(path), number)
+}
 
 /// Faults to put into a plant.
 pub(super) struct FaultScript {
@@ -39,10 +46,9 @@ impl FaultScript {
     /// # Errors
     /// [`SimulationError::Faults`] with the line, if the file has no such scenario or one of its faults means nothing.
     pub(super) fn read(name: &str) -> Result<Self, SimulationError> {
-        let numbered = name.rsplit_once(':').and_then(|(path, number)| Some((path, number.parse().ok()?)));
-        let (path, number): (&str, usize) = numbered.unwrap_or((name, 1));
-        let failed = |cause: String| SimulationError::Faults(PathBuf::from(path), cause);
-        let text = input_file::read_text(Path::new(path)).map_err(|cause| failed(cause.to_string()))?;
+        let (path, number) = scenario(name);
+        let failed = |cause: String| SimulationError::Faults(path.to_owned(), cause);
+        let text = input_file::read_text(path).map_err(|cause| failed(cause.to_string()))?;
         let file: File = toml::from_str(&text).map_err(|cause| failed(cause.to_string()))?;
         let scenario = number.checked_sub(1).and_then(|index| file.scenario.into_iter().nth(index));
         let scenario = scenario.ok_or_else(|| failed(format!("there is no scenario {number}")))?;

@@ -70,8 +70,7 @@ impl Simulation {
         if let Some(name) = &options.faults {
             FaultScript::read(name)?.order(&mut plant);
         }
-        let log = options.bus_log.as_deref().map(|path| BusLog::create(path, options.replace_logs)).transpose()?;
-        if log.is_some() {
+        if options.bus_log.is_some() {
             plant.record_bus();
         }
         let engine: Box<dyn Execute> = match &options.engine {
@@ -87,6 +86,9 @@ impl Simulation {
             Engine::Board(engine) => Box::new(EmulatedBoard::spawn(engine, options, &mut plant)?),
             Engine::Absent => Box::new(Absent),
         };
+        // Last: what cannot be started replaces no log.
+        let log = options.bus_log.as_deref().map(|path| BusLog::create(path, options.replace_logs, &options.inputs()));
+        let log = log.transpose()?;
         Ok(Self { plant, engine, now: 0, log, traffic: None })
     }
 

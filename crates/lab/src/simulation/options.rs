@@ -10,7 +10,7 @@ use sim::world::HOME;
 use sim::world::mujoco::{Imperfections, MujocoWorld, Scene};
 use sim::{FingerObstacle, FreeJoints, Held, PlantConfig, World};
 
-use super::SimulationError;
+use super::{SimulationError, fault_script};
 use crate::transport::{ChipOptions, LineKind, SimulatorKind, SimulatorOptions};
 
 /// Environment variable that names the firmware image for QEMU.
@@ -139,6 +139,8 @@ pub struct SimulationOptions {
     pub bus_log: Option<PathBuf>,
     /// Logs may replace files that exist.
     pub replace_logs: bool,
+    /// Files that no log replaces: what the caller reads.
+    pub reads: Vec<PathBuf>,
     /// Where the emulated board writes its report when its power is switched off, JSON; other engines have none.
     pub board_report: Option<PathBuf>,
     /// Time for which the clock of the device has run already. [`Engine::InProcess`] only.
@@ -235,12 +237,20 @@ impl SimulationOptions {
             line: LineKind::Serial,
             bus_log: None,
             replace_logs: false,
+            reads: Vec::new(),
             board_report: None,
             uptime: Duration::ZERO,
             flash: FlashSource::New,
             faults: None,
             grip: None,
         }
+    }
+
+    /// Files that no log replaces.
+    pub(super) fn inputs(&self) -> Vec<&Path> {
+        let flash = if let FlashSource::File(path) = &self.flash { Some(path.as_path()) } else { None };
+        let script = self.faults.as_deref().map(|name| fault_script::scenario(name).0);
+        self.reads.iter().map(PathBuf::as_path).chain(flash).chain(script).collect()
     }
 
     /// The world at its start.
