@@ -74,6 +74,41 @@ fn h9_a_device_with_a_secret_is_commanded_by_those_who_name_its_file_and_no_secr
 }
 
 #[test]
+fn a_secret_that_is_no_file_is_told_at_once_and_one_that_others_may_read_with_the_command_that_helps() {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    tactus(at, "secret new lab.secret", None).success();
+    std::fs::create_dir(at.join("folder")).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(at.join("pipe")).status().unwrap().success());
+    for (name, kind) in [("folder", "a folder"), ("pipe", "a pipe")] {
+        // Nobody ever writes into the pipe: to read it would be to wait for ever.
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+        let command = command.current_dir(at).timeout(std::time::Duration::from_secs(60));
+        let line = format!("{DEVICE} secret set {name}");
+        let refused = said(&command.args(line.split_whitespace()).assert().code(2));
+        assert!(refused.contains("E239") && refused.contains(kind), "{refused}");
+    }
+    let set = |mode: u32| {
+        let file = at.join("lab.secret");
+        std::fs::set_permissions(&file, std::fs::Permissions::from_mode(mode)).unwrap();
+        let _ = std::fs::remove_file(at.join("arm.flash"));
+        let kept = said(&tactus(at, &format!("{DEVICE} secret set lab.secret"), None).success());
+        kept + &said(&tactus(at, &format!("{DEVICE} hand init"), Some("lab.secret")).success())
+    };
+    assert!(!set(0o600).contains("warning"));
+    for mode in [0o644, 0o620] {
+        assert_eq!(set(mode).matches("`chmod 600 lab.secret`").count(), 2, "{mode:o}");
+    }
+    // A shell hands over what another program says as a pipe of its own.
+    let line = format!("\"$0\" {DEVICE} --secret-file <(cat lab.secret) delete nothing");
+    let mut shell = Command::new("bash");
+    let shell = shell.current_dir(at).args(["-c", &line, env!("CARGO_BIN_EXE_tactus")]).assert().code(5);
+    assert!(said(&shell).contains("E513"), "{}", said(&shell));
+}
+
+#[test]
 fn the_file_with_the_secret_may_stand_in_the_configuration_and_is_shown_with_its_origin() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("tactus")).unwrap();

@@ -3,9 +3,9 @@
 //! No secret is made from words that a person remembers: whoever has listened to one proof can try all such words at
 //! leisure, and a hash as fast as this one lets them try a thousand million a second.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read as _, Write as _};
-use std::os::unix::fs::OpenOptionsExt as _;
+use std::os::unix::fs::{FileTypeExt as _, OpenOptionsExt as _, PermissionsExt as _};
 use std::path::Path;
 
 use link::Secret;
@@ -24,6 +24,9 @@ pub enum SecretFileError {
     /// It holds something else.
     #[error("it does not hold 32 hexadecimal digits")]
     Form,
+    /// It is no file: nobody may ever write into a pipe, and reading it would wait for that.
+    #[error("it is {0}, not a file with a secret")]
+    NotAFile(&'static str),
 }
 
 impl SecretFileError {
@@ -31,7 +34,7 @@ impl SecretFileError {
     #[must_use]
     pub fn code(&self) -> ErrorCode {
         match self {
-            Self::Form => ErrorCode::NoSecretInFile,
+            Self::Form | Self::NotAFile(_) => ErrorCode::NoSecretInFile,
             Self::System(cause) if cause.kind() == io::ErrorKind::AlreadyExists => ErrorCode::WouldReplace,
             Self::System(cause) if cause.kind() == io::ErrorKind::InvalidData => ErrorCode::NoSecretInFile,
             Self::System(cause) => ErrorCode::of_file(cause).unwrap_or(ErrorCode::FileFailed),
@@ -42,9 +45,24 @@ impl SecretFileError {
 /// Reads the secret in a file.
 ///
 /// # Errors
-/// The file cannot be read, or holds something else.
+/// The file cannot be read, or is none, or holds something else.
 pub fn read(path: &Path) -> Result<Secret, SecretFileError> {
+    let kind = fs::metadata(path)?.file_type();
+    // `<(pass show lab)` of a shell is a pipe as well, with somebody at its other end.
+    let is_of_the_shell = path.starts_with("/dev/fd") || path.starts_with("/proc");
+    if kind.is_dir() {
+        return Err(SecretFileError::NotAFile("a folder"));
+    }
+    if kind.is_socket() || kind.is_fifo() && !is_of_the_shell {
+        return Err(SecretFileError::NotAFile("a pipe or a socket"));
+    }
     parse(&input_file::read_text(path)?).ok_or(SecretFileError::Form)
+}
+
+/// True if others than its owner may read or replace the content of a file.
+#[must_use]
+pub fn is_open_to_others(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|found| found.is_file() && found.permissions().mode() & 0o066 != 0)
 }
 
 /// Draws a secret and writes it into a new file, which nobody but its owner may read.
@@ -56,8 +74,10 @@ pub fn create(path: &Path) -> Result<Secret, SecretFileError> {
     File::open("/dev/urandom")?.read_exact(&mut bytes)?;
     let secret = Secret::new(bytes);
     let mut file = OpenOptions::new().write(true).create_new(true).mode(0o600).open(path)?;
-    file.write_all(text(&secret).as_bytes())?;
-    file.sync_all()?;
+    file.write_all(text(&secret).as_bytes()).and_then(|()| file.sync_all()).inspect_err(|_| {
+        // Half a secret would only be in the way of the next one.
+        let _ = fs::remove_file(path);
+    })?;
     Ok(secret)
 }
 
@@ -76,8 +96,6 @@ fn parse(text: &str) -> Option<Secret> {
 
 #[cfg(test)]
 mod tests {
-    use std::os::unix::fs::PermissionsExt as _;
-
     use super::*;
 
     #[test]

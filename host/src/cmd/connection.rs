@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use control::Fault;
 use device::Stage;
-use link::{HomeSource, Refusal, SecretState, Status};
+use link::{HomeSource, Refusal, Secret, SecretState, Status};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
@@ -49,10 +49,23 @@ pub(super) fn open_to_change_secret(global: &Global, doing: &str) -> Result<Clie
     let client = Client::connect(device, &owner).map_err(|error| error.into_failure(doing))?;
     let mut client = set_up(client, global);
     if let Some(file) = &global.secret_file {
-        let secret = secret_file::read(file).map_err(|error| secret_failure(file, error, doing))?;
+        let secret = read_secret(file, global.output()).map_err(|error| secret_failure(file, error, doing))?;
         client.unlock(&secret).map_err(|error| error.into_failure(doing))?;
     }
     Ok(client)
+}
+
+/// Reads the secret in a file, and warns where it is none to others.
+///
+/// # Errors
+/// The file cannot be read, is none, or holds something else.
+pub(super) fn read_secret(file: &Path, output: Output) -> Result<Secret, SecretFileError> {
+    let secret = secret_file::read(file)?;
+    if secret_file::is_open_to_others(file) {
+        let name = file.display();
+        output.warn(format!("others than its owner may read or change {name}: `chmod 600 {name}`"));
+    }
+    Ok(secret)
 }
 
 /// The failure of a file with a secret.
@@ -70,7 +83,7 @@ pub(super) fn secret_failure(file: &Path, error: SecretFileError, doing: &str) -
 fn prove(client: &mut Client<Device>, global: &Global, doing: &str) -> Result<(), Failure> {
     let Some(file) = &global.secret_file else { return Ok(()) };
     let output = global.output();
-    let secret = match secret_file::read(file) {
+    let secret = match read_secret(file, output) {
         Ok(secret) => secret,
         Err(error) => {
             output.warn(format!("the secret in {} cannot be read: {error}", file.display()));

@@ -72,7 +72,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             global.output().result(&data, words)
         }
         Action::Set(FileOf { file }) => {
-            let secret = secret_file::read(file).map_err(|error| connection::secret_failure(file, error, DOING))?;
+            let secret = connection::read_secret(file, global.output())
+                .map_err(|error| connection::secret_failure(file, error, DOING))?;
             let mut client = connection::open_to_change_secret(global, DOING)?;
             client.keep_secret(&secret).map_err(failed)?;
             client.unlock(&secret).map_err(failed)?;
