@@ -287,6 +287,8 @@ fn advice_names_commands_and_options_that_there_are() {
         ("E507", "`--at-home`"),
         ("E526", "`tactus run` goes to the start"),
         ("E537", "`tactus hand init`"),
+        // No command tares; zeroing does.
+        ("ContactForce", "zero it again (`--at-home`)"),
         ("E220", "`_` and `.`"),
     ] {
         assert!(explained(code).contains(words), "{code}: {}", explained(code));
@@ -295,6 +297,23 @@ fn advice_names_commands_and_options_that_there_are() {
     let output = tactus(folder.path(), "--device sil:aim=7 list");
     for option in ["seed=", "arm=", "world=", "line=", "bus=", "flash=", "faults="] {
         assert!(said(&output).contains(option), "{option}: {}", said(&output));
+    }
+}
+
+#[test]
+fn an_address_that_cannot_be_read_is_answered_with_the_one_that_was_meant_and_not_with_a_simulator() {
+    let folder = tempfile::tempdir().unwrap();
+    for (given, help) in [
+        ("/dev/ttyACM0", "`--device serial:/dev/ttyACM0`"),
+        ("COM3", "`--device serial:COM3`"),
+        ("can0", "`--device can:can0`"),
+        ("sil", "`--device sil:`"),
+        ("arm.sock", "`--device unix:arm.sock`"),
+        ("tcp:localhost", "correct the address; `tactus --help`"),
+        ("sil:seed=x", "correct the address; `tactus --help`"),
+    ] {
+        let (code, told) = refused(folder.path(), &format!("--device {given} status"));
+        assert!(code == "E201" && told.starts_with(help) && !told.contains("sim:"), "{given}: {code}: {told}");
     }
 }
 

@@ -246,6 +246,7 @@ impl HostError {
     pub fn into_failure(self, doing: impl Into<String>) -> Failure {
         let help = match &self {
             Self::Transport(TransportError::Can(problem)) => problem.help(),
+            Self::Address(error) => error.help(),
             Self::Watched { .. } => {
                 Some("end one of them; `tactus stop` stops the arm from here, however many look on".to_owned())
             }

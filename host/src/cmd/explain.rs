@@ -25,11 +25,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let text = command.code.as_str();
     let mut faults = Fault::ALL.into_iter().filter(|fault| *fault != Fault::None);
     let fault = faults.find(|fault| format!("{fault:?}").eq_ignore_ascii_case(text));
-    let (code, meaning, reaction, cause, remedy) = match (error(text), fault) {
-        (Some(code), _) => (code.to_string(), code.meaning(), "", code.cause(), code.remedy()),
+    let (code, meaning, reaction, cause, check, remedy) = match (error(text), fault) {
+        (Some(code), _) => (code.to_string(), code.meaning(), "", code.cause(), "", code.remedy()),
         (None, Some(fault)) => {
-            let FaultGuide { reaction, cause, clear, .. } = FaultGuide::of(fault);
-            (format!("{fault:?}"), fault.explanation(), reaction, cause, clear)
+            let FaultGuide { reaction, cause, check, clear } = FaultGuide::of(fault);
+            (format!("{fault:?}"), fault.explanation(), reaction, cause, check, clear)
         }
         (None, None) => {
             let cause = format!("'{text}' is neither the code of an error nor the name of a fault");
@@ -38,14 +38,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     };
     let exit = error(text).map(|code| code.exit() as u8);
     let mut words = format!("{code}: {meaning}");
-    for (name, text) in [("the arm", reaction), ("usual cause", cause), ("help", remedy)] {
+    for (name, text) in [("the arm", reaction), ("usual cause", cause), ("check", check), ("help", remedy)] {
         if !text.is_empty() {
             words += &format!("\n  {name}: {text}");
         }
     }
     let text = str::to_owned;
-    let data =
-        Explained { code: code.to_string(), meaning: text(meaning), cause: text(cause), help: text(remedy), exit };
+    let (meaning, cause, check, help) = (text(meaning), text(cause), text(check), text(remedy));
+    let data = Explained { code, meaning, cause, check, help, exit };
     global.output().result(&data, words)
 }
 
@@ -58,6 +58,8 @@ pub struct Explained {
     pub meaning: String,
     /// The usual cause; empty where the meaning says it.
     pub cause: String,
+    /// The places to look at first, of a fault of the device; empty otherwise.
+    pub check: String,
     /// The remedy; empty where nothing helps in general.
     pub help: String,
     /// Exit code of a command that fails so; null for a fault of the device.

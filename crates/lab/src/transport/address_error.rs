@@ -28,3 +28,22 @@ pub enum AddressError {
     #[error("devices on a CAN bus have the numbers 0 to 15, not '{0}'")]
     DeviceNumber(String),
 }
+
+impl AddressError {
+    /// The address that was probably meant, as an advice; `None` where the message says all there is to say.
+    #[must_use]
+    pub fn help(&self) -> Option<String> {
+        let Self::Kind(text) = self else { return None };
+        let word = text.trim_end_matches(':');
+        let meant = match word {
+            "sim" | "sil" | "board" | "hand" => format!("{word}:"),
+            _ if word.starts_with("/dev/") || word.starts_with("COM") => format!("serial:{word}"),
+            _ if word.starts_with("can") || word.starts_with("vcan") || word.starts_with("slcan") => {
+                format!("can:{word}")
+            }
+            _ if word.ends_with(".sock") => format!("unix:{word}"),
+            _ => return None,
+        };
+        Some(format!("`--device {meant}`"))
+    }
+}
