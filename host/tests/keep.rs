@@ -94,6 +94,9 @@ fn a_folder_that_cannot_be_made_is_told_before_anything_moves() {
     std::fs::write(at.join("runs"), "a file").unwrap();
     let refused = tactus(at, &format!("{DEVICE} run reach.toml --keep")).failure().code(2);
     let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
-    assert!(said.contains("run refused: runs: cannot be written") && !said.contains("running 'reach'"), "{said}");
+    assert!(
+        said.contains("run refused: making the folder runs: a file has that name") && !said.contains("running 'reach'"),
+        "{said}"
+    );
     assert_eq!(std::fs::read_to_string(at.join("runs")).unwrap(), "a file");
 }

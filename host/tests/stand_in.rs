@@ -231,3 +231,22 @@ fn a_program_that_was_suspended_in_a_move_says_so_and_waits_for_nothing() {
     assert!(said.contains("the device has no session with this host"), "{said}");
     assert!(begun.elapsed() < Duration::from_secs(20), "after {:?}", begun.elapsed());
 }
+
+/// `tactus --json monitor | head -1`: it would watch for ever, and keep one of two places from others.
+#[test]
+fn a_monitor_ends_when_nobody_reads_its_lines_any_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let _arm = StandIn::start(at);
+    assert!(tactus(at, "hand --at-home init").status.success());
+    let mut monitor = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    monitor.current_dir(at).env("TACTUS_DEVICE", "unix:tactus.sock").args(["--json", "monitor", "--duration", "60"]);
+    monitor.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut monitor = monitor.spawn().unwrap();
+    let mut lines = BufReader::new(monitor.stdout.take().unwrap());
+    lines.read_line(&mut String::new()).unwrap();
+    drop(lines);
+    let begun = std::time::Instant::now();
+    assert!(monitor.wait().unwrap().success());
+    assert!(begun.elapsed() < Duration::from_secs(30), "{:?}", begun.elapsed());
+}

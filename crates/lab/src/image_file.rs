@@ -49,7 +49,7 @@ pub struct ImageFile {
 #[derive(Debug, thiserror::Error)]
 pub enum ImageFileError {
     /// The file cannot be read.
-    #[error("cannot read {}", path.display())]
+    #[error("cannot read {}: {source}", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,

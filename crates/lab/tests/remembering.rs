@@ -8,7 +8,7 @@ use control::{State, flags};
 use lab::demonstration::{Recording, RecordingRow};
 use lab::learn::memory::{MemoryError, Payload, remember_rehearsals, remember_successes};
 use lab::learn::{LearnOptions, learn};
-use lab::primitive_file::PrimitiveFile;
+use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
 use link::Telemetry;
 
 const DURATION: f64 = 5.0;
@@ -92,9 +92,12 @@ fn successes_become_statistics_that_end_with_the_next_rehearsal() {
     assert_eq!((statistics.spread[30][0], statistics.spread[30][4]), (0.5, 0.06));
     let finger = statistics.mean[32][9];
     assert!((finger - 32.0 / 63.0).abs() < 0.01, "{finger}");
-    assert!(file.to_image().is_ok());
+    // No device takes them alone.
+    assert!(matches!(file.to_image(), Err(PrimitiveFileError::StatisticsAlone { .. })));
     remember_rehearsals(&mut file, &runs, DURATION, Payload::default(), true).unwrap();
     assert!(file.statistics.is_none());
+    remember_successes(&mut file, &runs).unwrap();
+    assert!(file.to_image().is_ok());
 }
 
 /// The largest statistic of the device's watch over a recording, judged by the statistics of a primitive.

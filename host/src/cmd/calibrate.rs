@@ -82,14 +82,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             show(&mut client, global)
         }
         Action::Home(Home { set: Some(home), report, .. }) => {
-            let report = CalibrationReport::open(report.as_deref(), &client, global, DOING)?;
+            let report = CalibrationReport::open(report.as_deref(), &[], &client, global, DOING)?;
             let stored = store(&mut client, home.map(|angle| angle as f32), None, global);
             report.write("home", stored.is_ok(), &json!({ "home_rad": home }), global)?;
             stored?;
             show(&mut client, global)
         }
         Action::Home(Home { here: Some(truth), at_home, report, .. }) => {
-            let report = CalibrationReport::open(report.as_deref(), &client, global, DOING)?;
+            let report = CalibrationReport::open(report.as_deref(), &[], &client, global, DOING)?;
             connection::joints_read(&mut client, *at_home, global.output(), DOING)?;
             let corrected = procedure::correct_home(&mut client, *truth);
             let correction = corrected.map_err(|error| connection::failure(error, DOING))?;

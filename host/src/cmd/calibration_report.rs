@@ -25,9 +25,10 @@ impl CalibrationReport {
     /// Opens the file, before anything moves. In a folder it is named with serial number and time.
     ///
     /// # Errors
-    /// It cannot be written, or is there already.
+    /// It cannot be written, or is there already, or is one of `inputs`.
     pub(super) fn open(
         path: Option<&Path>,
+        inputs: &[&Path],
         client: &Client<Device>,
         global: &Global,
         doing: &str,
@@ -36,7 +37,7 @@ impl CalibrationReport {
         let serial = client.hello().serial.as_str().to_owned();
         let path = path
             .map(|path| if path.is_dir() { path.join(name(&serial, origin.date.as_deref())) } else { path.to_owned() });
-        let opened = path.map(|path| Ok((files::create(&path, global, &[], doing)?, path))).transpose()?;
+        let opened = path.map(|path| Ok((files::create(&path, global, inputs, doing)?, path))).transpose()?;
         Ok(Self { opened, serial, device: origin.device, firmware: origin.firmware, date: origin.date })
     }
 

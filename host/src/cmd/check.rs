@@ -59,6 +59,11 @@ pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Fa
             return Failure::new(ErrorCode::ExpectationStale, format!("{doing} refused {}", path.display()), cause)
                 .help(format!("record it again: `tactus rehearse {}`", path.display()));
         }
+        PrimitiveFileError::StatisticsAlone { .. } => {
+            let help = format!("`tactus rehearse {}` records an expectation; then gather them again", path.display());
+            return Failure::new(ErrorCode::NoExpectation, format!("{doing} refused {}", path.display()), cause)
+                .help(help);
+        }
         PrimitiveFileError::Schema { .. } => ErrorCode::PrimitiveSchema,
         PrimitiveFileError::Checksum { .. } => ErrorCode::PrimitiveChecksum,
         PrimitiveFileError::Image { .. } | PrimitiveFileError::Invalid { .. } => ErrorCode::PrimitiveInvalid,

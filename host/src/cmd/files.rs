@@ -1,13 +1,13 @@
 //! The files that commands write: one rule for all of them, and a recording that outlives whatever ends it.
 
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use lab::demonstration::{Origin, Played};
 use lab::output_file::{OutputError, OutputFile};
 use lab::primitive_file::PrimitiveFile;
 
-use super::{Failure, Global, Output};
+use super::{ErrorCode, Failure, Global, Output};
 use lab::client::Client;
 use lab::device::Device;
 
@@ -22,6 +22,23 @@ pub(super) fn create(path: &Path, global: &Global, inputs: &[&Path], doing: &str
         opened = OutputFile::create(path, true, inputs);
     }
     opened.map_err(|error| failure(error, doing))
+}
+
+/// Makes a folder, and those above it.
+///
+/// # Errors
+/// A file has its name, or the system refuses.
+pub(super) fn create_folder(folder: &Path, doing: &str) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|cause| {
+        let doing = format!("{doing}: making the folder {}", folder.display());
+        match cause.kind() {
+            ErrorKind::AlreadyExists | ErrorKind::NotADirectory => {
+                Failure::new(ErrorCode::OutputNotAFile, doing, "a file has that name, or the name of a folder above it")
+                    .help("name a folder, or one that does not exist yet")
+            }
+            _ => Failure::of_file(ErrorCode::FileFailed, doing, cause),
+        }
+    })
 }
 
 /// Fills a file and puts it at its place.

@@ -120,6 +120,7 @@ fn confirm(image: &ImageFile, global: &Global, doing: &str) -> Result<(), Failur
 /// An image that cannot be used, as a failure.
 pub(super) fn image_failure(error: ImageFileError, doing: &str) -> Failure {
     let code = match &error {
+        ImageFileError::Unreadable { .. } => return Failure::of_file(ErrorCode::ImageUnreadable, doing, error),
         ImageFileError::UnknownBoard { .. } => {
             return Failure::new(ErrorCode::ImageOfNoBoard, doing, error)
                 .help("use a `tactus` built from the same sources as the image");

@@ -31,7 +31,7 @@ const DOING: &str = "calibrate friction";
 /// # Errors
 /// The device refuses, the arm stops, or the passes tell no friction.
 pub(super) fn run(command: &Friction, client: &mut Client<Device>, global: &Global) -> Result<(), Failure> {
-    let report = CalibrationReport::open(command.report.as_deref(), client, global, DOING)?;
+    let report = CalibrationReport::open(command.report.as_deref(), &[], client, global, DOING)?;
     connection::ready(client, command.at_home, global.output(), DOING)?;
     let weight = procedure::weight_in_use(client).map_err(|error| connection::failure(error, DOING))?;
     let (postures, speeds) = (POSTURES.len(), DURATIONS.len());

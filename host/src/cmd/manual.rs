@@ -1,6 +1,5 @@
 //! `tactus manual`: a page for `man` of each command.
 
-use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use clap::{Args, Command, CommandFactory as _};
@@ -32,15 +31,7 @@ pub struct Written {
 /// put at their places, none is replaced then.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let doing = "manual";
-    std::fs::create_dir_all(&command.folder).map_err(|cause| {
-        let doing = format!("manual: making the folder {}", command.folder.display());
-        match cause.kind() {
-            ErrorKind::AlreadyExists | ErrorKind::NotADirectory => {
-                Failure::new(ErrorCode::OutputNotAFile, doing, "a file has that name, or the name of a folder above it")
-            }
-            _ => Failure::of_file(ErrorCode::FileFailed, doing, cause),
-        }
-    })?;
+    files::create_folder(&command.folder, doing)?;
     let mut tool = Cli::command().disable_help_subcommand(true);
     tool.build();
     let mut pages = Vec::new();

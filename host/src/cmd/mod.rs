@@ -274,7 +274,13 @@ pub fn parse() -> Result<Cli, ExitCode> {
             | Command::Completions(_)
             | Command::Manual(_)
     );
+    // An arm is not left moving because of a file that only saves typing.
+    let stops = matches!(cli.command, Command::Stop(_)) && cli.global.device.is_some();
     match config {
+        Err(failure) if stops => {
+            cli.global.output().warn(format!("{}: {}", failure.doing, failure.cause));
+            Ok(cli)
+        }
         Err(failure) if !needs_none => Err(tell(&failure, cli.global.json)),
         Err(failure) => {
             cli.global.origins.problem = Some(format!("{}: {}", failure.doing, failure.cause));
@@ -343,14 +349,21 @@ fn tell(failure: &Failure, json: bool) -> ExitCode {
 pub fn usage(error: &clap::Error) -> ExitCode {
     let wants_json = std::env::args_os().any(|argument| argument == "--json");
     if error.use_stderr() && wants_json {
-        let text = error.render().to_string();
-        let words = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
-        let failure = Failure::new(ErrorCode::CommandLine, "tactus", words);
+        let failure = Failure::new(ErrorCode::CommandLine, "tactus", reason(&error.render().to_string()));
         // Nobody may be there any more to read it.
         let _ = writeln!(std::io::stdout(), "{}", failure.to_json());
     }
     let _ = error.print();
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
+}
+
+/// The mistake in a command line, on one line: all that stands above the usage, or a word on a command that is
+/// missing, for which the whole help is shown.
+fn reason(text: &str) -> String {
+    let Some(text) = text.strip_prefix("error: ") else { return "a command or an option is missing".to_owned() };
+    let lines =
+        text.lines().take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"));
+    lines.map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
 /// Asks a person on a terminal; false where nobody may be asked, or for any answer but yes.

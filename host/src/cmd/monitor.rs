@@ -114,7 +114,9 @@ fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, durat
                 watch.cycle(telemetry);
                 let is_due = line.is_none_or(|last| telemetry.cycle.wrapping_sub(last) >= LINE_EVERY);
                 if let (View::Lines(output), true) = (&mut *view, is_due) {
-                    output.result(&watch.to_json(), "").map_err(Ended::View)?;
+                    if !output.line(&watch.to_json(), "").map_err(Ended::View)? {
+                        return Ok(());
+                    }
                     line = Some(telemetry.cycle);
                 }
             }
@@ -122,7 +124,9 @@ fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, durat
                 let words = watch.event(&event).to_owned();
                 if let View::Lines(output) = view {
                     let data = serde_json::json!({ "event": words, "cycle": event.cycle });
-                    output.result(&data, "").map_err(Ended::View)?;
+                    if !output.line(&data, "").map_err(Ended::View)? {
+                        return Ok(());
+                    }
                 }
             }
             None => {}

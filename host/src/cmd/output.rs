@@ -39,6 +39,15 @@ impl Output {
     /// # Errors
     /// The output cannot take it, or the data cannot be expressed in JSON.
     pub fn result(&self, data: &impl Serialize, text: impl AsRef<str>) -> Result<(), Failure> {
+        // `tactus check FILE | head -1` is a way to use it.
+        self.line(data, text).map(|_| ())
+    }
+
+    /// As [`result`](Self::result), of a command that writes line after line; false once nobody reads them any more.
+    ///
+    /// # Errors
+    /// As [`result`](Self::result).
+    pub fn line(&self, data: &impl Serialize, text: impl AsRef<str>) -> Result<bool, Failure> {
         let line: Cow<'_, str> = if self.json {
             serde_json::to_string(data)
                 .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, WRITING, cause))?
@@ -48,10 +57,9 @@ impl Output {
         };
         let mut stdout = std::io::stdout().lock();
         match writeln!(stdout, "{line}").and_then(|()| stdout.flush()) {
-            // `tactus check FILE | head -1` is a way to use it.
-            Err(cause) if cause.kind() == ErrorKind::BrokenPipe => Ok(()),
+            Err(cause) if cause.kind() == ErrorKind::BrokenPipe => Ok(false),
             Err(cause) => Err(Failure::of_file(ErrorCode::ResultNotWritten, WRITING, cause)),
-            Ok(()) => Ok(()),
+            Ok(()) => Ok(true),
         }
     }
 

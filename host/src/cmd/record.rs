@@ -18,7 +18,7 @@ pub struct Cmd {
     #[arg(long, short, value_name = "FILE", default_value = "recording.csv")]
     pub output: PathBuf,
     /// Duration, s
-    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = teach::duration)]
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = teach::recorded)]
     pub duration: f64,
 }
 

@@ -14,7 +14,7 @@ use lab::demonstration::{Origin, RATE, Recording};
 use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
 use lab::output_file::OutputFile;
 use lab::primitive_file::{LARGEST_DURATION_DEVIATION, PrimitiveFile};
-use lab::procedure::{self, CHANNELS, FlagCounts, Mode, ProcedureError};
+use lab::procedure::{self, CHANNELS, FlagCounts, Mode};
 
 /// Options of `rehearse`.
 #[derive(Debug, Clone, Args)]
@@ -93,8 +93,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     keepable(&movement, command.speed)?;
     upload::precheck(&movement, &Course::stored(command.speed), output, DOING)?;
     if let Some(folder) = &command.record_dir {
-        std::fs::create_dir_all(folder)
-            .map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING))?;
+        files::create_folder(folder, DOING)?;
     }
     let target = command.output.clone().unwrap_or_else(|| command.primitive.clone());
     let output_file = memory_target(&target, &command.primitive, &[], global, DOING)?;

@@ -37,7 +37,7 @@ impl RunFolder {
     pub(super) fn create(base: &Path, primitive: &PrimitiveFile) -> Result<Self, Failure> {
         let failed =
             |path: &Path, cause| files::failure(OutputError::System { file: path.to_owned(), cause }, "run refused");
-        fs::create_dir_all(base).map_err(|cause| failed(base, cause))?;
+        files::create_folder(base, "run refused")?;
         let path = unused(base, &Origin::now(), &primitive.name).map_err(|cause| failed(base, cause))?;
         let file = path.join("primitive.toml");
         primitive.write(&file).map_err(|cause| super::check::failure(cause, &file, "run refused"))?;

@@ -11,7 +11,7 @@ use sim::teacher::TaughtMovement;
 use super::files::{Counted, RecordingFile};
 use super::{ErrorCode, Failure, Global, connection, files};
 use lab::client::Client;
-use lab::demonstration::RATE;
+use lab::demonstration::{FEWEST_SAMPLES, RATE};
 use lab::device::Device;
 use lab::error::Capability;
 use lab::procedure::{self, ProcedureError, Recorder, teacher};
@@ -33,7 +33,7 @@ pub struct Cmd {
     #[arg(long, value_name = "Q1,...,Q7", value_parser = start_posture, allow_hyphen_values = true)]
     pub from: Option<Posture>,
     /// Duration of the recording, s. Without it: until Enter is pressed, or until the simulated teacher has let go
-    #[arg(long, value_name = "SECONDS", value_parser = duration)]
+    #[arg(long, value_name = "SECONDS", value_parser = recorded)]
     pub duration: Option<f64>,
     /// I have brought the arm to its home pose: zero it there if need be
     #[arg(long)]
@@ -225,7 +225,16 @@ pub(super) fn posture(text: &str) -> Result<Posture, String> {
     values.try_into().map_err(|_| format!("7 joint angles are expected, {found} are given"))
 }
 
-/// A time worth recording, s.
+/// Duration of a recording, s: a shorter one cannot be read again.
+pub(super) fn recorded(text: &str) -> Result<f64, String> {
+    let shortest = FEWEST_SAMPLES as f64 / RATE;
+    match duration(text) {
+        Ok(seconds) if seconds >= shortest => Ok(seconds),
+        _ => Err(format!("a time between {shortest} and 3600 s is expected")),
+    }
+}
+
+/// A time worth waiting for, s.
 pub(super) fn duration(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= 3600.0 => Ok(seconds),

@@ -47,7 +47,7 @@ pub(super) fn run(command: &Gravity, client: &mut Client<Device>, global: &Globa
         let weight = client.weight().map_err(|error| error.into_failure(DOING))?;
         return global.output().result(&weight_data(&weight), weight_text(&weight));
     }
-    let report = CalibrationReport::open(command.report.as_deref(), client, global, DOING)?;
+    let report = CalibrationReport::open(command.report.as_deref(), &[], client, global, DOING)?;
     connection::ready(client, command.at_home, global.output(), DOING)?;
     let present = procedure::weight_in_use(client).map_err(|error| connection::failure(error, DOING))?;
     global.output().say(format!("the arm moves through {} postures, a few minutes; Ctrl-C stops it", TOUR.len()));

@@ -96,6 +96,9 @@ impl PrimitiveFile {
         }
         let (movement, feedback) = (&self.movement, self.feedback.as_ref());
         let (expectation, statistics) = (self.expectation.as_ref(), self.statistics.as_ref());
+        if statistics.is_some() && expectation.is_none() {
+            return Err(PrimitiveFileError::StatisticsAlone { file: self.file.clone() });
+        }
         let content = ImageContent::<&[f32]> {
             model_hash: self.model_hash,
             duration: movement.duration as f32,

@@ -106,6 +106,12 @@ pub enum PrimitiveFileError {
         /// Duration of the movement, s.
         duration: f64,
     },
+    /// Statistics without the expectation whose filter they were measured through: no device takes them.
+    #[error("{file}: [statistics]: they are of use only beside an expectation, and there is none", file = file.display())]
+    StatisticsAlone {
+        /// The file.
+        file: PathBuf,
+    },
     /// The expectation was recorded with another model of the arm than the movement was learned with.
     #[error("{file}: [expectation]: recorded with robot model 0x{found:08x}, the movement has model 0x{expected:08x}", file = file.display())]
     ExpectationModel {

@@ -1,5 +1,7 @@
 //! `tactus calibrate payload --measure`: mass and centre of what hangs on the wrist, by its sensor and by the joints.
 
+use std::path::{Path, PathBuf};
+
 use super::data::{EarlierError, Measured, ObjectData, next, read_earlier};
 use super::{DOING, Payload, declared};
 use crate::cmd::calibration_report::CalibrationReport;
@@ -21,7 +23,8 @@ pub(super) fn run(command: &Payload, client: &mut Client<Device>, global: &Globa
     let unusable = |error: EarlierError| Failure::of_file(ErrorCode::EmptyHandInvalid, DOING, error);
     let earlier = command.without.as_deref().map(|file| read_earlier(file, client.hello().serial.as_str()));
     let earlier = earlier.transpose().map_err(unusable)?;
-    let report = CalibrationReport::open(command.report.as_deref(), client, global, DOING)?;
+    let inputs: Vec<&Path> = command.without.iter().map(PathBuf::as_path).collect();
+    let report = CalibrationReport::open(command.report.as_deref(), &inputs, client, global, DOING)?;
     connection::ready(client, command.at_home, global.output(), DOING)?;
     let weight = procedure::weight_in_use(client).map_err(|error| connection::failure(error, DOING))?;
     if weight.payload() == control::Payload::None {
