@@ -5,8 +5,8 @@
 //! one folder deeper, and `cargo xtask setup` puts the library into `target/mujoco/lib`. Not tied to a feature of this
 //! package: cargo may switch the MuJoCo world of `sim` on for a neighbour, and then these executables need it too.
 //!
-//! Other packages use this script too: a path relative to one of them is missing in the others, and cargo would build
-//! them anew in every call.
+//! Other packages use this script too, and `experiment` repeats its line: a path relative to one of them is missing in
+//! the others, and cargo would build them anew in every call.
 
 fn main() {
     let package = std::env::var("CARGO_PKG_NAME").unwrap_or_default();

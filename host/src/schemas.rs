@@ -7,8 +7,8 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 
 use crate::cmd::{
-    config, delete, doctor, explain, export, get, hand, learn, list, manual, payload, plot, record, rehearse, rename,
-    report, run_report, secret, settings, sim, statistics, stop, teach, upload,
+    config, delete, doctor, experiment, explain, export, get, hand, learn, list, manual, payload, plot, record,
+    rehearse, rename, report, run_report, secret, settings, sim, statistics, stop, teach, upload,
 };
 
 /// Every schema by the name of its command; `error` is that of any command that fails.
@@ -26,6 +26,8 @@ pub fn all() -> Vec<(&'static str, Schema)> {
         ("doctor", of::<doctor::Examined>()),
         ("error", of::<FailureData>()),
         ("statistics", of::<statistics::Known<'_>>()),
+        ("experiment", of::<experiment::Tried>()),
+        ("experiment-study", of::<experiment::Studied>()),
         ("explain", of::<explain::Explained>()),
         ("export", of::<export::Exported>()),
         ("get", of::<get::Gotten>()),

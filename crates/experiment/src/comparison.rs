@@ -57,7 +57,7 @@ pub fn quantities(scenario: Scenario) -> &'static [Quantity] {
 }
 
 /// One quantity, adaptation relative to open loop.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Ratio {
     /// Name of the quantity.
     pub name: &'static str,
@@ -76,7 +76,7 @@ pub struct Ratio {
 }
 
 /// Open loop against adaptation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Comparison {
     /// Pairs of trials that are compared.
     pub pairs: usize,

@@ -7,7 +7,7 @@ use sim::world::mujoco::{ObjectKind, ObjectSpec, TABLE_TOP};
 
 use super::grid::{ApproachFrame, Cell, Grid};
 use super::outcome::Rule;
-use super::results::{Header, Key};
+use super::results::{CODE, Header, Key};
 use super::scenario::{PlantKind, Scenario};
 use super::seed;
 use super::variation::Variation;
@@ -19,7 +19,7 @@ use lab::procedure::Mode;
 use lab::simulation::Engine;
 use lab::transport::ChipOptions;
 
-/// Version of what a trial is: results of another one cannot be continued.
+/// Version of what a trial is: results of another one can neither be continued nor drawn.
 const VERSION: u32 = 3;
 
 /// An experiment.
@@ -188,11 +188,9 @@ impl Config {
             described.insert("arms".to_owned(), "weighed".to_owned());
         }
         let text = described.iter().map(|(name, value)| format!("{name}={value}\n")).collect::<String>();
-        Header {
-            experiment: self.scenario.name().to_owned(),
-            configuration: format!("{:08x}", checksum(text.as_bytes())),
-            described,
-        }
+        let configuration = format!("{:08x}", checksum(text.as_bytes()));
+        described.insert(CODE.to_owned(), env!("TACTUS_TRIAL_CODE").to_owned());
+        Header { experiment: self.scenario.name().to_owned(), configuration, described }
     }
 
     /// Seed of a trial.

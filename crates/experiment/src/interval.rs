@@ -15,7 +15,7 @@ const CONFIDENCE: f64 = 0.95;
 /// Arms and demonstrations are drawn anew, each with replacement and independently, and every demonstration meets the
 /// arms that were drawn. Cells are not drawn: they are chosen, not found. Of five arms the interval is rough and rather
 /// too narrow.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Interval {
     /// Mean.
     pub mean: f64,

@@ -15,6 +15,9 @@ use lab::procedure::Mode;
 /// File of the reports, one a line, in the order in which the trials ended.
 pub const LINES: &str = "results.jsonl";
 
+/// Name of the hash of the code among the words of a header ([`Header::described`]).
+pub const CODE: &str = "code";
+
 /// Which trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Key {
@@ -94,7 +97,8 @@ pub struct Header {
     pub experiment: String,
     /// Hash of everything that decides how a trial ends: only equal ones may share a file.
     pub configuration: String,
-    /// The configuration in words, for the message when it differs.
+    /// The configuration in words, for the message when it differs. With [`CODE`] the code that plays the trials counts
+    /// as well, without it results of any code will do.
     pub described: BTreeMap<String, String>,
 }
 
@@ -217,7 +221,10 @@ fn read(path: &Path, file: File, header: &Header) -> Result<(Vec<Report>, u64), 
         let broken = |cause| ResultsError::Line { file: path.to_owned(), line: number, cause };
         if number == 1 {
             let found: Header = serde_json::from_str(&text).map_err(broken)?;
-            if found.configuration != header.configuration || found.experiment != header.experiment {
+            let is_of_other_code =
+                header.described.get(CODE).is_some_and(|code| found.described.get(CODE) != Some(code));
+            if found.configuration != header.configuration || found.experiment != header.experiment || is_of_other_code
+            {
                 return Err(ResultsError::OtherConfiguration {
                     file: path.to_owned(),
                     differences: differences(&found, header),
@@ -427,6 +434,27 @@ mod tests {
         assert!(matches!(again, ResultsError::Exists { trials: 1, .. }), "{again}");
         let other = Log::open(folder.path(), &header("cup"), true).err().unwrap().to_string();
         assert!(other.contains("object was torch, is cup") && !other.contains("plant"), "{other}");
+    }
+
+    /// The change that makes it fail: the number of the version alone, which nobody raises with each law.
+    #[test]
+    fn results_of_other_code_are_not_continued_but_may_be_drawn() {
+        let of_code = |code: Option<&str>| {
+            let mut header = header("torch");
+            header.described.extend(code.map(|code| (CODE.to_owned(), code.to_owned())));
+            header
+        };
+        for (was, words) in [(Some("0x1"), "code was 0x1, is 0x2"), (None, "code was -, is 0x2")] {
+            let folder = tempfile::tempdir().unwrap();
+            let (mut log, _) = Log::open(folder.path(), &of_code(was), false).unwrap();
+            log.add(&fixtures::results(&[1]).reports[0]).unwrap();
+            drop(log);
+            let other = Log::open(folder.path(), &of_code(Some("0x2")), true).err().unwrap();
+            assert!(matches!(other, ResultsError::OtherConfiguration { .. }), "{other}");
+            assert!(other.to_string().contains(words), "{other}");
+            assert_eq!(Log::open(folder.path(), &of_code(None), true).unwrap().1.len(), 1);
+            assert_eq!(Log::open(folder.path(), &of_code(was), true).unwrap().1.len(), 1);
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError, mpsc};
 use super::config::Config;
 use super::grid::Cell;
 use super::reach;
-use super::results::{Key, Log, Report, Results, ResultsError};
+use super::results::{CODE, Key, Log, Report, Results, ResultsError};
 use super::statistics::Summary;
 use super::trial::{self, Prepared, Trial, TrialError};
 use lab::client::Interrupt;
@@ -186,7 +186,12 @@ fn opened(config: &Config) -> Result<(Option<Log>, Vec<Report>), ExperimentError
     if config.as_it_is {
         Log::must_exist(folder)?;
     }
-    let (log, reports) = Log::open(folder, &config.header(), config.resume || config.as_it_is)?;
+    let mut header = config.header();
+    if config.as_it_is {
+        // Results may be drawn by a later program than the one that played the trials.
+        header.described.remove(CODE);
+    }
+    let (log, reports) = Log::open(folder, &header, config.resume || config.as_it_is)?;
     Ok((Some(log), reports))
 }
 

@@ -12,7 +12,7 @@ use lab::procedure::Mode;
 const GRIP_BAR: f64 = 1.5;
 
 /// A quantity over trials.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, schemars::JsonSchema)]
 pub struct Spread {
     /// Median.
     pub median: f64,
@@ -30,7 +30,7 @@ impl Spread {
 }
 
 /// Failures of one kind, and how many of them the device told before the lift.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, schemars::JsonSchema)]
 pub struct FailureCounts {
     /// Trials that failed in this way.
     pub failures: usize,
@@ -39,7 +39,7 @@ pub struct FailureCounts {
 }
 
 /// Performance of the device's watch in reporting failures.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, schemars::JsonSchema)]
 pub struct Detection {
     /// Trials that succeeded.
     pub successes: usize,
@@ -113,7 +113,7 @@ impl Detection {
 }
 
 /// Statistics of the trials of one mode.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Summary {
     /// The mode.
     pub mode: Mode,

@@ -69,7 +69,7 @@ impl FromStr for Sweep {
 }
 
 /// Cells that were held, for one plant: mode by mode, demonstration by demonstration, arm by arm.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Point {
     /// Value of the factor that is swept; `None` of a study without a sweep.
     pub value: Option<f64>,

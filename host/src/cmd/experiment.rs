@@ -4,9 +4,12 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::Args;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global};
-use experiment::{Grid, Mode, PlantKind, Scenario, Sweep, Variation};
+use experiment::sweep::Point;
+use experiment::{Comparison, Grid, Mode, PlantKind, Scenario, Summary, Sweep, Variation};
 
 /// Options of `experiment`.
 #[derive(Debug, Clone, Args)]
@@ -79,6 +82,34 @@ pub struct Cmd {
     pub keep_recordings: bool,
 }
 
+/// Data of `tactus --json experiment`, of one experiment.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Tried {
+    /// Which experiment.
+    pub experiment: Scenario,
+    /// The folder of its results.
+    pub folder: String,
+    /// Statistics of each mode.
+    pub modes: Vec<Summary>,
+    /// Open loop against adaptation; `null` where there is nothing to compare.
+    pub comparison: Option<Comparison>,
+}
+
+/// Data of `tactus --json experiment` with `--demonstrations` or `--sweep`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Studied {
+    /// Which experiment.
+    pub experiment: Scenario,
+    /// The folder of its results.
+    pub folder: String,
+    /// Demonstrations of each point.
+    pub demonstrations: usize,
+    /// Name of the factor that is swept; `null` without a sweep.
+    pub sweep: Option<String>,
+    /// Cells that were held, value by value.
+    pub points: Vec<Point>,
+}
+
 /// Largest number of an arm or a person; those that gather statistics have numbers above.
 const LARGEST_NUMBER: u64 = 1000;
 
@@ -120,8 +151,8 @@ mod work {
     use std::path::Path;
     use std::time::Instant;
 
-    use super::{Cmd, ErrorCode, Failure, Global};
-    use crate::cmd::{Output, connection, upload};
+    use super::{Cmd, ErrorCode, Failure, Global, Studied, Tried};
+    use crate::cmd::{Output, connection, files, upload};
     use control::model::WeightCorrection;
     use experiment::calibrated::{Calibrated, CalibrationError};
     use experiment::lift::{self, Case};
@@ -283,19 +314,19 @@ mod work {
                 break;
             }
         }
-        let data = serde_json::json!({
-            "experiment": command.scenario, "folder": out, "demonstrations": demonstrations, "sweep": name, "points": points,
-        });
+        let (folder, sweep) = (files::text(out), name.map(str::to_owned));
+        let data = Studied { experiment: command.scenario, folder, demonstrations, sweep, points };
+        let points = &data.points;
         let file = out.join("study.json");
         save(&file, &data)?;
         if let (Some(name), Some(config)) = (name, configs.first()) {
             let title = format!("{}: held along {name}", config.object.row().title);
-            figures::curve::draw(&points, name, &title).write(out, "sweep").map_err(|cause| {
+            figures::curve::draw(points, name, &title).write(out, "sweep").map_err(|cause| {
                 Failure::new(ErrorCode::ExperimentFigure, "experiment: a figure cannot be made", cause)
             })?;
             output.say(format!("wrote {}", out.join("sweep.png").display()));
         }
-        output.result(&data, sweep::table(&points, name))
+        output.result(&data, sweep::table(points, name))
     }
 
     /// Carries all trials through with a progress bar; gives the time it took as well, s.
@@ -350,7 +381,7 @@ mod work {
         figures::write_lift(&rows, config.grid.cells.len() * config.seeds.len(), &file)
             .map_err(|cause| Failure::new(ErrorCode::ExperimentFigure, "experiment: a figure cannot be made", cause))?;
         output.say(format!("wrote {}", file.join("sag.png").display()));
-        let data = serde_json::json!({ "experiment": config.scenario, "folder": out, "cases": rows });
+        let data = serde_json::json!({ "experiment": config.scenario, "folder": files::text(&out), "cases": rows });
         let file = out.join("results.json");
         save(&file, &data)?;
         output.result(&data, lift::table(&rows))
@@ -436,7 +467,7 @@ mod work {
         render: bool,
         output: Output,
         wall: f64,
-    ) -> Result<(serde_json::Value, String), Failure> {
+    ) -> Result<(Tried, String), Failure> {
         let summaries = experiment.summaries(config);
         let results = experiment.results.without_wall_times();
         let comparison = Comparison::of(&results, config.scenario);
@@ -462,10 +493,8 @@ mod work {
         if let Some(comparison) = &comparison {
             text.push_str(&format!("\n{comparison}"));
         }
-        let data = serde_json::json!({
-            "experiment": config.scenario, "folder": out, "modes": summaries, "comparison": comparison,
-        });
-        Ok((data, text))
+        let folder = files::text(out);
+        Ok((Tried { experiment: config.scenario, folder, modes: summaries, comparison }, text))
     }
 
     fn mean(values: impl Iterator<Item = f64>) -> f64 {
@@ -474,7 +503,7 @@ mod work {
     }
 
     /// Writes data as JSON: what was there before is whole until the new file is.
-    fn save(file: &Path, data: &serde_json::Value) -> Result<(), Failure> {
+    fn save(file: &Path, data: &impl serde::Serialize) -> Result<(), Failure> {
         let text = serde_json::to_string_pretty(data)
             .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
         output_file::replace(file, text.as_bytes()).map_err(|cause| unwritable(file, cause))

@@ -10,7 +10,19 @@ use serde::{Deserialize, Serialize};
 
 /// Use of the measured force in a run. In files and tables of experiments a mode is its letter.
 #[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, clap::ValueEnum, Serialize, Deserialize,
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Default,
+    clap::ValueEnum,
+    Serialize,
+    Deserialize,
+    schemars::JsonSchema,
 )]
 pub enum Mode {
     /// Position control with stiff gains; forces change nothing
