@@ -147,7 +147,9 @@ fn files_that_are_no_images_are_refused_by_name() {
         assert!(text.contains("error[E681]") && text.contains("arm.elf") && text.contains("help: "), "{text}");
     }
     let folder = laboratory(b"", Some(0));
-    tactus(folder.path(), &["flash", "--image", "elsewhere.elf"]).code(6);
+    // A missing file is a wrong command line, as for every command.
+    let missing = tactus(folder.path(), &["flash", "--image", "elsewhere.elf"]).code(2);
+    assert!(stderr(&missing).contains("error[E233]"), "{}", stderr(&missing));
 }
 
 #[test]
