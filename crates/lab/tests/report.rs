@@ -84,7 +84,7 @@ fn the_end_of_a_run_is_what_came_right_behind_it_whatever_else_was_recorded() {
             *line = fields.join(",");
         }
         let file = folder.path().join("changed.csv");
-        std::fs::write(&file, lines.join("\n")).unwrap();
+        std::fs::write(&file, lines.join("\n") + "\n").unwrap();
         ReportedRun::read(&file, None).unwrap().outcome
     };
     assert_eq!(outcome(None, State::Hold), Outcome::ArrivedUnlike);
