@@ -36,7 +36,7 @@ assert np.abs(run.position[:count] - fast.position[:count]).max() > 0.05
 torn = folder / "torn.csv.part"
 torn.write_text((folder / "run.csv").read_text()[:-20])
 assert len(tr.read_recording(torn)) == len(run) - 1
-for text, words in [("a,b\n1,2\n", "no column t_s"), ("t_s,phase\n1\n", "line 2: 1 fields"), ("t_s\nx\n", "column t_s"), ("", "no header")]:
+for text, words in [("a,b\n1,2\n", "no column t_s"), ("t_s,phase\n1\n", "line 2: 1 fields"), ("t_s\nx\n", "column t_s"), ("", "no header"), ("t_s\n0.1\n0.12", "line 3: the line has no end")]:
     (folder / "bad.csv").write_text(text)
     try:
         tr.read_recording(folder / "bad.csv")

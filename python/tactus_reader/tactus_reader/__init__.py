@@ -94,6 +94,8 @@ def read_recording(path):
                 notes[key.strip()] = value.strip()
         elif path.suffix == ".part" and not line.endswith("\n"):
             break  # it was being written when the end came
+        elif not line.endswith(("\n", "\r")):
+            raise ValueError(f"{path}, line {number}: the line has no end: the file was cut, maybe within a number")
         elif line.strip():
             rows.append((number, next(csv.reader([line]))))
     if not rows:
