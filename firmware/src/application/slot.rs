@@ -111,7 +111,9 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
         meters.slot(self.timer.acknowledge());
         let begin = self.clock.short_ticks();
         // Slots have a timer of their own. By a clock that stands still no host is ever silent.
-        let stands_still = begin == self.begin;
+        if begin == self.begin {
+            core.lock(|core| core.note_overrun());
+        }
         self.begin = begin;
         let now = self.clock.now_us();
         let (mut late, mut lost, mut off) = (false, false, false);
@@ -166,7 +168,7 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
             }
         }
         self.slot = slot.next();
-        if stands_still || self.timer.is_due() {
+        if self.timer.is_due() {
             core.lock(|core| core.note_overrun());
         }
     }

@@ -247,8 +247,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         set |= if surprise > R::constant(1.0) { flags::SURPRISE } else { 0 };
         set |= if run.is_faded(primitive) { flags::FEEDBACK_FADED } else { 0 };
         set |= if operational.is_clamped() { flags::CLAMPED } else { 0 };
-        let free = senses == Senses::Fresh && drift.is_free() && !self.hand.is_gripping() && !self.cut.is_cut();
-        if options.compliant && free {
+        let free = senses == Senses::Fresh && drift.is_free() && !self.cut.is_cut();
+        if options.compliant && self.hand.is_gripping() {
+            settling.fade();
+        } else if options.compliant && free {
             settling.step(&tracking.stiffness, measured.state, &reference, |joint| handover.fall(joint));
         }
         torque.0 += handover.step() + settling.torque();

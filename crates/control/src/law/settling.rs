@@ -10,7 +10,8 @@
 //! * within 1.5 times the friction of the model: an obstacle that no sensor feels is pressed with that much more, and
 //!   no more with time.
 //!
-//! The caller leaves it as it is while something is touched: there the feedback decides how hard.
+//! The caller leaves it as it is while something is touched: there the feedback decides how hard. Once the hand grips,
+//! it fades: with what it holds the arm turns round, and friction with it.
 
 use crate::law::integral::TOLERANCE;
 use crate::model::wam7;
@@ -38,6 +39,9 @@ const RISE: f64 = 2.0;
 /// times that of the spring against its damping.
 const FULL: f64 = 0.02;
 
+/// Time constant with which it fades in a grip (s): gone before the fingers have closed.
+const FADING: f64 = 0.5;
+
 /// Control periods between two turns of a joint: in a run there is no time for all joints in one.
 const TURNS: f64 = JOINTS as f64;
 
@@ -60,6 +64,20 @@ impl<R: Real> Settling<R> {
         &self.torque
     }
 
+    /// One control period in a grip, in turns as well.
+    #[inline(never)]
+    pub fn fade(&mut self) {
+        let joint = self.take_turn();
+        self.torque[joint] *= R::constant(1.0 - TURNS * PERIOD / FADING);
+    }
+
+    /// Returns the joint whose turn it is.
+    fn take_turn(&mut self) -> usize {
+        let joint = usize::from(self.turn) % JOINTS;
+        self.turn = joint as u8 + 1;
+        joint
+    }
+
     /// One control period. The joint whose turn it is moves for all periods since its last one, and takes over what
     /// another law gives away in each of them, `given` joint by joint (N m).
     ///
@@ -72,8 +90,7 @@ impl<R: Real> Settling<R> {
         reference: &JointReference<R>,
         given: impl FnOnce(usize) -> R,
     ) {
-        let joint = usize::from(self.turn) % JOINTS;
-        self.turn = joint as u8 + 1;
+        let joint = self.take_turn();
         let error = reference.q.0[joint] - state.q.0[joint];
         let closing = state.dq.0[joint] - reference.dq.0[joint];
         let [clamp, full] = [CLAMP[joint], CLAMP[joint] / RISE].map(R::constant);
@@ -150,6 +167,16 @@ mod tests {
             let leaving = after(1.0, 0.1 * sign, -0.5 * sign, 0.0);
             assert!(leaving.iter().all(|torque| torque * sign > 0.0), "{leaving}");
         }
+    }
+
+    #[test]
+    fn a_grip_takes_the_torque_of_every_joint_away() {
+        let mut settling = Settling { torque: Vector7::from(CLAMP), turn: 0 };
+        for _ in 0..(3.0 * FADING / PERIOD) as u32 {
+            settling.fade();
+        }
+        let left = settling.torque().component_div(&Vector7::from(CLAMP));
+        assert!(left.iter().all(|share| (0.02..0.06).contains(share)), "{left}");
     }
 
     #[test]

@@ -330,7 +330,7 @@ impl<'a> Table<'a> {
             } else {
                 // What is wrong with a line that was cut is that.
                 table.read_row(line, &record).map_err(|wrong| match cut {
-                    Some(cut) if cut == line => unfinished(cut),
+                    Some(cut) if cut == line && table.is_ours() => unfinished(cut),
                     _ => wrong,
                 })?;
             }
@@ -338,7 +338,15 @@ impl<'a> Table<'a> {
         if table.names.is_empty() {
             return Err(RecordingError::Empty { file: file.to_owned() });
         }
-        cut.map_or(Ok(table), |line| Err(unfinished(line)))
+        match cut {
+            Some(line) if table.is_ours() => Err(unfinished(line)),
+            _ => Ok(table),
+        }
+    }
+
+    /// True if the columns are those of our recordings, which end every line. Others often do not end the last one.
+    fn is_ours(&self) -> bool {
+        layout::header().iter().eq(self.names.iter())
     }
 
     fn read_header(&mut self, line: u64, record: &csv::ByteRecord) -> Result<(), RecordingError> {
