@@ -177,8 +177,10 @@ fn a_file_that_was_cut_within_its_last_number_is_told_and_not_read_with_another_
         assert!(error.to_string().contains(&format!("{FILE}: line {line}")), "{error}");
     }
     // The change that makes it fail: every file has to end its last line. Spreadsheets do not.
-    let of_others = "t_s,x_m,y_m,z_m\n0,0.1,0.2,0.3\n0.1,0.1,0.2,0.31";
-    assert_eq!(Recording::parse(Path::new(FILE), of_others.as_bytes()).expect("a whole file").time.len(), 2);
+    let joints = "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,q7_rad";
+    let rows: Vec<String> = (0..100).map(|row| format!("{},0,0.6,0,1.6,0,0.2,0.01", f64::from(row) * 0.004)).collect();
+    let of_others = format!("t_s,{joints}\n{}", rows.join("\n"));
+    assert_eq!(Recording::parse(Path::new(FILE), of_others.as_bytes()).expect("a whole file").time.len(), 100);
     for end in ["\r\n", "\r"] {
         let whole = good()[1..].join(end) + end;
         assert!(Recording::parse(Path::new(FILE), whole.as_bytes()).is_ok(), "{end:?}");
