@@ -73,6 +73,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::guard::disagreement::Disagreement<R>::encoder_stands_still", "a motor stands still"),
     ("control::guard::disagreement::torques_of", "a motor stands still"),
     ("control::cycle::hand::HandDrive<R>::is_gripping", "the memory is full; three fingers, a dozen instructions"),
+    ("control::law::settling", "the memory is full; one joint in a cycle, a few dozen instructions"),
     ("control::law::hand::bound_closing", "the memory is full; three fingers, a few dozen instructions"),
     ("control::cycle::Cycle<R,_>::catch", "no torque: no plan and no law is computed"),
     ("control::sense::joints::Motor::doubt", "a reply that does not fit the ones before"),
