@@ -82,6 +82,10 @@ fn touch_grasps_what_open_loop_misses() {
     assert!(blindly <= HELD_BLINDLY, "{blindly} of 12 are held without any use of force: the experiment shows nothing");
 }
 
+/// Largest difference of a joint that breaks away from its friction at another moment (rad): 21 mrad were seen, at J7,
+/// after 7 s of free motion; J3 and J5 by 7 and 11 mrad.
+const BREAKS_AWAY: f64 = 0.03;
+
 #[test]
 fn firmware_grasps_what_the_application_in_this_process_grasps() {
     let config = Config {
@@ -97,7 +101,8 @@ fn firmware_grasps_what_the_application_in_this_process_grasps() {
     let found = (outcomes(&carried_through(&in_process)), outcomes(&carried_through(&firmware)));
     println!("{:?}", found.0);
     assert_eq!(found.0, found.1);
-    // Until something is touched they agree to a few encoder counts (docs/experiments.md), and the plans to less than
+    // Until something is touched they agree to a few encoder counts (docs/experiments.md), but for a joint that friction
+    // holds while its integral rises: a count decides when it breaks away (decision 0122). The plans agree to less than
     // they move in a cycle: a primitive that began a cycle later would be noticed, as is seen here.
     let files = expect(std::fs::read_dir(folder.path().join("sil/recordings")));
     let names: Vec<_> = files.map(|file| expect(file).file_name()).collect();
@@ -111,7 +116,7 @@ fn firmware_grasps_what_the_application_in_this_process_grasps() {
         assert!(start.joint_rad < 2e-6, "{name:?} does not begin alike: {start:?}");
         assert!(before.samples > 600, "{name:?}: {before:?}");
         let alike =
-            before.joint_rad < 1.5e-3 && before.position_m < 1e-3 && before.plan_m.is_some_and(|m| m < SAME_PLAN);
+            before.joint_rad < BREAKS_AWAY && before.position_m < 1e-3 && before.plan_m.is_some_and(|m| m < SAME_PLAN);
         assert!(alike, "{name:?}: {before:?}");
         let later = expect(Difference::between(&planned_a_cycle_later(in_process), &firmware, TOUCH)).before_contact;
         assert!(later.plan_m.is_some_and(|m| m > SAME_PLAN), "{name:?}: a cycle more would not be noticed: {later:?}");
