@@ -101,9 +101,9 @@ fn firmware_grasps_what_the_application_in_this_process_grasps() {
     let found = (outcomes(&carried_through(&in_process)), outcomes(&carried_through(&firmware)));
     println!("{:?}", found.0);
     assert_eq!(found.0, found.1);
-    // Until something is touched they agree to a few encoder counts (docs/experiments.md), but for a joint that is
-    // held by friction while its integral rises: a count decides when it breaks away (decision 0122). The plans agree to less than
-    // they move in a cycle: a primitive that began a cycle later would be noticed, as is seen here.
+    // Until something is touched they agree to a few encoder counts (docs/experiments.md), but for a joint that is held
+    // by friction while its integral rises: a count decides when it breaks away (decision 0122). The plans agree to
+    // less than they move in a cycle: a primitive that began a cycle later would be noticed, as is seen here.
     let files = expect(std::fs::read_dir(folder.path().join("sil/recordings")));
     let names: Vec<_> = files.map(|file| expect(file).file_name()).collect();
     assert_eq!(names.len(), found.0.len());
