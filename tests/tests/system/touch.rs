@@ -86,6 +86,9 @@ fn touch_grasps_what_open_loop_misses() {
 /// after 7 s of free motion; J3 and J5 by 7 and 11 mrad.
 const BREAKS_AWAY: f64 = 0.03;
 
+/// Cycles of free motion from which on that has been seen; in 3361 cycles joints differ by 1.0 mrad.
+const LONG: usize = 3600;
+
 #[test]
 fn firmware_grasps_what_the_application_in_this_process_grasps() {
     let config = Config {
@@ -115,8 +118,9 @@ fn firmware_grasps_what_the_application_in_this_process_grasps() {
         let (start, before) = (difference.start, difference.before_contact);
         assert!(start.joint_rad < 2e-6, "{name:?} does not begin alike: {start:?}");
         assert!(before.samples > 600, "{name:?}: {before:?}");
+        let joints = if before.samples < LONG { 1.5e-3 } else { BREAKS_AWAY };
         let alike =
-            before.joint_rad < BREAKS_AWAY && before.position_m < 1e-3 && before.plan_m.is_some_and(|m| m < SAME_PLAN);
+            before.joint_rad < joints && before.position_m < 1e-3 && before.plan_m.is_some_and(|m| m < SAME_PLAN);
         assert!(alike, "{name:?}: {before:?}");
         let later = expect(Difference::between(&planned_a_cycle_later(in_process), &firmware, TOUCH)).before_contact;
         assert!(later.plan_m.is_some_and(|m| m > SAME_PLAN), "{name:?}: a cycle more would not be noticed: {later:?}");

@@ -39,7 +39,7 @@ const RISE: f64 = 2.0;
 /// times that of the spring against its damping.
 const FULL: f64 = 0.02;
 
-/// Time constant with which it fades in a grip (s): gone before the fingers have closed.
+/// Time constant with which it fades in a grip (s): gone before the hand lifts what it has closed on.
 const FADING: f64 = 0.5;
 
 /// Control periods between two turns of a joint: in a run there is no time for all joints in one.
