@@ -103,7 +103,7 @@ fn a_compliant_arm_that_touches_something_is_left_to_its_spring() {
     assert!(left > 0.012, "{left} m");
 }
 
-/// What the hand holds turns the arm round, and its friction: what was there against it would double it.
+/// With what the hand holds the arm turns round, and its friction: what was there against it would double it.
 ///
 /// The change that makes it fail: a grip leaves the integral as it is.
 #[test]
