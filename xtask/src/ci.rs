@@ -29,6 +29,7 @@ fn checks() -> Result<()> {
     let machine = setup::all()?;
     let images = Lane::begin(&["ci", "images"])?;
     lint_host()?;
+    build::documentation()?;
     plain_root()?;
     crate::faults(&[])?;
     crate::faults(&["storm", "--runs", "300"])?;
@@ -41,7 +42,6 @@ fn checks() -> Result<()> {
     test::with_the_world()?;
     test::firmware()?;
     crate::faults(&["--device", "sim:"])?;
-    build::documentation()?;
     board.end()?;
     budget::run(&machine)?;
     hand::run(&machine)?;

@@ -4,7 +4,7 @@
 //! lacks in gravity: 1 to 3 cm at the hand. While nothing is touched a torque per joint is therefore moved towards the
 //! error:
 //!
-//! * in proportion to what the error exceeds half of [`TOLERANCE`] by, at most all of [`CLAMP`] in [`RISE`]. Slower
+//! * in proportion to what the error exceeds half of `TOLERANCE` by, at most all of `CLAMP` in `RISE`. Slower
 //!   than the spring and its damping, so that an arm without friction does not swing about its plan;
 //! * not where a joint closes its error at that rate already: more torque would only carry it past;
 //! * within 1.5 times the friction of the model: an obstacle that no sensor feels is pressed with that much more, and
