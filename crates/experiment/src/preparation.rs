@@ -126,12 +126,14 @@ impl From<lab::simulation::SimulationError> for PreparationError {
 }
 
 /// A demonstration: what is taught, and by which of the simulated people, on which of the arms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Teaching {
     /// Movement that is taught, and the object it is for.
     pub scenario: Scenario,
     /// The difference between plant and model.
     pub plant: PlantKind,
+    /// Speed of the movement that is learned, of the one that was shown.
+    pub speed: f64,
     /// Which demonstration, from 1. Each has a person who trembles in another way, and an arm of its own.
     pub number: u64,
 }
@@ -160,7 +162,7 @@ pub fn make(
     say("teaching");
     let recording = teach(scenario, &arm, interrupt)?;
     say("learning");
-    let primitive = learn(scenario, &recording, file)?;
+    let primitive = learn(teaching, &recording, file)?;
     say("rehearsing");
     rehearsed(&Config { plant, jobs, ..Config::new(scenario, primitive) }, interrupt)
 }
@@ -245,8 +247,9 @@ fn teach(scenario: Scenario, arm: &Arm, interrupt: &Interrupt) -> Result<Recordi
 }
 
 /// Movement of the arm as shown, with fingers that close where the hand rests.
-fn learn(scenario: Scenario, recording: &Recording, file: &Path) -> Result<PrimitiveFile, PreparationError> {
-    let shown = Demonstration::prepare(recording, &Preparation::default())?.duration();
+fn learn(teaching: Teaching, recording: &Recording, file: &Path) -> Result<PrimitiveFile, PreparationError> {
+    let Teaching { scenario, speed, .. } = teaching;
+    let shown = Demonstration::prepare(recording, &Preparation::default())?.duration() / speed;
     let tuning = GraspTuning::of(scenario);
     let dwell = if scenario.lifts_itself() { 0.0 } else { tuning.closing };
     let movement = scenario.taught_movement();
@@ -257,6 +260,7 @@ fn learn(scenario: Scenario, recording: &Recording, file: &Path) -> Result<Primi
     let fingers = |angle: f64| [0.0, angle, angle, angle];
     let usual = LearnOptions::named(scenario.name());
     let options = LearnOptions {
+        speed,
         dwell,
         hand: HandMotion {
             start: fingers(if scenario == Scenario::Flashlight { WIDE_OPEN } else { OPEN }),

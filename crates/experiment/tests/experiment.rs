@@ -11,7 +11,7 @@ use lab::primitive_file::PrimitiveFile;
 
 fn primitive() -> PrimitiveFile {
     let file = Path::new("flashlight.toml");
-    let teaching = Teaching { scenario: Scenario::Flashlight, plant: PlantKind::Perturbed, number: 1 };
+    let teaching = Teaching { scenario: Scenario::Flashlight, plant: PlantKind::Perturbed, speed: 1.0, number: 1 };
     preparation::make(teaching, file, 2, &Interrupt::never(), &mut |_| {})
         .expect("the person teaches, and the arm learns")
 }

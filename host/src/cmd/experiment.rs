@@ -47,6 +47,15 @@ pub struct Cmd {
     /// The primitive, TOML; without it one is taught, learned and rehearsed first
     #[arg(long, value_name = "FILE")]
     pub primitive: Option<PathBuf>,
+    /// Learn the movement this many times as fast as it is shown; the fingers keep their time
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        default_value_t = 1.0,
+        conflicts_with = "primitive",
+        allow_hyphen_values = true
+    )]
+    pub learn_speed: f64,
     /// Difference between the simulated arm and the controller's model
     #[arg(long, value_enum, default_value = "perturbed")]
     pub plant: PlantKind,
@@ -439,7 +448,8 @@ mod work {
         let spinner = output.spinner("teaching");
         let jobs =
             command.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
-        let teaching = Teaching { scenario: command.scenario, plant: command.plant, number };
+        let teaching =
+            Teaching { scenario: command.scenario, plant: command.plant, speed: command.learn_speed, number };
         let made = preparation::make(teaching, &file, jobs, interrupt, &mut |doing| {
             spinner.set_message(doing.to_owned());
         })

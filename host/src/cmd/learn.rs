@@ -43,6 +43,9 @@ pub struct Cmd {
     /// Speed below which the arm counts as still before and behind the movement, m/s
     #[arg(long, default_value_t = STILL_SPEED, value_name = "M_PER_S", allow_hyphen_values = true)]
     pub still_speed: f64,
+    /// Speed of the movement that is learned, of the one that was shown; a dwell keeps its time
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR", allow_hyphen_values = true)]
+    pub speed: f64,
     /// Learn the whole recording, with the time in which the arm stands still
     #[arg(long)]
     pub no_trim: bool,
@@ -95,6 +98,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         kernels: usize::from(command.kernels),
         cutoff: command.cutoff,
         preparation: Preparation { still_speed: (!command.no_trim).then_some(command.still_speed) },
+        speed: command.speed,
         orientation_error: if command.rotation_vector {
             OrientationError::RotationVector
         } else {

@@ -54,7 +54,7 @@ fn primitive() -> &'static PrimitiveFile {
     static PRIMITIVE: OnceLock<PrimitiveFile> = OnceLock::new();
     PRIMITIVE.get_or_init(|| {
         let file = Path::new("flashlight.toml");
-        let teaching = Teaching { scenario: Scenario::Flashlight, plant: PlantKind::Perturbed, number: 1 };
+        let teaching = Teaching { scenario: Scenario::Flashlight, plant: PlantKind::Perturbed, speed: 1.0, number: 1 };
         expect(preparation::make(teaching, file, 2, &Interrupt::never(), &mut |_| {}))
     })
 }

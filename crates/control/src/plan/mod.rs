@@ -2,6 +2,7 @@
 
 pub mod approach;
 pub mod bounds;
+pub(crate) mod brake;
 pub(crate) mod goal;
 pub mod hand;
 pub mod load;

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 
 use crate::command::{Goal, Refusal, RunOptions};
 use crate::guard::watch::{Surprise, Watch};
+use crate::plan::brake::brake;
 use crate::plan::goal::GoalFilter;
 use crate::plan::load::within_reach;
 use crate::plan::primitive::{Coupling, Primitive, Reference, Rollout, StartState, configuration, posture_and_hand};
@@ -84,6 +85,8 @@ pub(crate) struct Run<R: Real, const N: usize> {
     load: R,
     /// Speed factor that was asked for, and whether it is held to [`SLOW`].
     speed: (f32, bool),
+    /// Velocity of the plan in the last tick (m/s, world axes).
+    velocity: Vector3<R>,
 }
 
 impl<R: Real, const N: usize> Run<R, N> {
@@ -138,6 +141,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             end: R::constant(1.0),
             load: R::constant(0.0),
             speed: (options.speed, false),
+            velocity: Vector3::zeros(),
         };
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
         run.rollout.set_speed_slew(None).map_err(reason)?;
@@ -194,6 +198,17 @@ impl<R: Real, const N: usize> Run<R, N> {
             }
         }
         self.end = at_least(self.end, self.rollout.progress() + R::constant(FOLLOWING));
+    }
+
+    /// Adds what takes the plan's speed against a force that was not expected. The force of this tick counts, not the
+    /// smoothed one: each millisecond does.
+    fn brake(&self, primitive: &Primitive<R, N>, coupling: &mut Coupling<R>) {
+        let Some(deviation) = &self.deviation else { return };
+        let rate = primitive.movement().rate() * self.rollout.speed();
+        if let Some(taken) = brake(&self.velocity, &deviation.wrench.force, rate) {
+            let (taken, [x, y, z]) = (taken * primitive.trust(&self.rollout), &mut coupling.poses[0].position);
+            (*x, *y, *z) = (*x + taken.x, *y + taken.y, *z + taken.z);
+        }
     }
 
     fn is_finished(&self) -> bool {
@@ -263,12 +278,16 @@ impl<R: Real, const N: usize> Run<R, N> {
             self.settled = true;
         }
         let kept = self.kept();
-        let coupling = self.coupling.map(|value| value * kept);
+        let mut coupling = self.coupling.map(|value| value * kept);
+        if senses == Senses::Fresh && self.options.compliant && !gripping && self.bends(primitive) {
+            self.brake(primitive, &mut coupling);
+        }
         let plan = self.rollout.step(primitive.movement(), R::constant(PERIOD), &coupling)?;
         if settles {
             let [PoseReference { position, orientation }] = &plan.poses;
             self.goal = GoalFilter::at(Place { position: position.x, orientation: orientation.quaternion });
         }
+        self.velocity = plan.poses[0].position.v.into();
         let (posture, hand) = posture_and_hand(&plan.points.v);
         let slow = |speeds: &[R], limit: f64| {
             speeds.iter().all(|speed| *speed < R::constant(limit) && *speed > R::constant(-limit))

@@ -120,6 +120,17 @@ impl Demonstration {
         }
     }
 
+    /// Goes the same way `speed` times as fast as it was shown.
+    pub fn hasten(&mut self, speed: f64) {
+        let shown: Vec<f64> = self.time.iter().map(|time| time / speed).collect();
+        let grid = resample::grid(&shown, 1.0 / RATE);
+        self.position = resample::vectors(&shown, &self.position, &grid);
+        self.orientation = resample::quaternions(&shown, &self.orientation, &grid);
+        self.q = self.q.as_ref().map(|q| resample::vectors(&shown, q, &grid));
+        self.wrench = self.wrench.as_ref().map(|wrench| resample::vectors(&shown, wrench, &grid));
+        self.time = grid;
+    }
+
     /// Resamples, finds the pose and trims.
     ///
     /// Joint angles count more than pose columns: they are what the arm measured, and the pose that the controller

@@ -25,7 +25,8 @@ pub(super) fn fit(
         &samples,
         &FitOptions {
             kernel_count: options.kernels,
-            cutoff: Some(options.cutoff),
+            // What trembled while it was shown trembles that much faster now.
+            cutoff: Some(options.cutoff * options.speed),
             control_period: Some(control::PERIOD),
             stiffness: Stiffness { poses: [[position, orientation]], points: points([posture; 7], [hand; 4]) },
             orientation_error: options.orientation_error,

@@ -42,6 +42,9 @@ const MOVING_END: f64 = 0.01;
 /// Fastest speed that may count as standing still, m/s: no movement that is shown by hand is faster all along.
 const FASTEST_STILL: f64 = 1.0;
 
+/// Speeds at which a movement can be learned, of the one that was shown.
+const SPEEDS: std::ops::RangeInclusive<f64> = 0.1..=10.0;
+
 /// Longest rest at the goal, s.
 const LONGEST_DWELL: f64 = 60.0;
 
@@ -60,6 +63,8 @@ pub struct LearnOptions {
     pub cutoff: f64,
     /// Trimming.
     pub preparation: Preparation,
+    /// Speed of the movement that is learned, of the one that was shown. People lead an arm slowly.
+    pub speed: f64,
     /// Orientation error.
     pub orientation_error: OrientationError,
     /// Rest at the goal that is appended to the demonstration, s: time for the fingers to close.
@@ -79,6 +84,7 @@ impl LearnOptions {
             kernels: 50,
             cutoff: 7.5,
             preparation: Preparation::default(),
+            speed: 1.0,
             orientation_error: OrientationError::Quaternion,
             dwell: 0.0,
             hand: HandMotion::default(),
@@ -178,7 +184,6 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
             reason: "the demonstration ends in motion, and nothing can rest behind that".to_owned(),
         });
     }
-    demonstration.rest(options.dwell);
     let mut warnings: Vec<String> = slow_ends(&demonstration).collect();
     if let Some(crept) = demonstration.crept.filter(|crept| *crept >= LEAST_CREPT) {
         warnings.push(format!(
@@ -187,6 +192,8 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
         ));
     }
     let largest_angle = check_angle(recording, &demonstration, options, &mut warnings)?;
+    demonstration.hasten(options.speed);
+    demonstration.rest(options.dwell);
     let posture = match &demonstration.q {
         Some(q) => q.clone(),
         None => {
@@ -277,7 +284,10 @@ fn check_options(options: &LearnOptions) -> Result<(), LearnError> {
             &format!("a speed between 0 and {FASTEST_STILL} m/s is expected; 0.005 is usual"),
         );
     }
-    let highest = RATE / 2.0;
+    if !SPEEDS.contains(&options.speed) {
+        return wrong("--speed", &format!("a factor from {} to {} is expected", SPEEDS.start(), SPEEDS.end()));
+    }
+    let highest = RATE / 2.0 / options.speed.max(1.0);
     if !(options.cutoff > 0.0 && options.cutoff < highest) {
         return wrong("--cutoff", &format!("a frequency between 0 and {highest} Hz is expected; 7.5 Hz is usual"));
     }
