@@ -358,6 +358,13 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
         self.time_scale.speed
     }
 
+    /// Velocities of the positions of the poses in the scaled system, m: times the rate of the next step they are what
+    /// it returns, m/s.
+    #[inline]
+    pub fn scaled_velocities(&self) -> [[T; 3]; P] {
+        self.poses.each_ref().map(|pose| pose.position.state.map(|axis| axis.v()))
+    }
+
     /// Phase s.
     #[inline]
     pub fn phase(&self) -> T {

@@ -19,9 +19,9 @@ const LARGEST: f64 = 100.0;
 /// Speed into what is touched that is left to Eq (8) (m/s): a hand that closes, or follows an object, moves so.
 const SLOW: f64 = 0.01;
 
-/// Returns `zeta` of the position (m, world axes) that takes from a plan of this velocity (m/s, world axes) its part
-/// against `force`, what the environment does to the robot beyond what was expected (N, world axes). `rate` is that of
-/// the rollout (1/s): `zeta` acts with its square. `None` where the plan does not run against the force.
+/// Returns `zeta` of the position (m, world axes) that takes from a plan of this velocity (m, world axes, in the scaled
+/// system: at `rate`, 1/s, that of the rollout) its part against `force`, what the environment does to the robot beyond
+/// what was expected (N, world axes). `None` where the plan does not run against the force.
 pub(crate) fn brake<R: Real>(velocity: &Vector3<R>, force: &Vector3<R>, rate: R) -> Option<Vector3<R>> {
     let against = -force.dot(velocity);
     if !(against > R::constant(0.0)) {
@@ -29,11 +29,11 @@ pub(crate) fn brake<R: Real>(velocity: &Vector3<R>, force: &Vector3<R>, rate: R)
     }
     let magnitude = sqrt(force.dot(force));
     let speed = against / magnitude;
-    if !(speed > R::constant(SLOW)) {
+    if !(speed * rate > R::constant(SLOW)) {
         return None;
     }
     let share = at_most(magnitude * R::constant(SENSITIVITY), R::constant(LARGEST));
-    Some(force * (speed * share / (magnitude * rate * rate)))
+    Some(force * (speed * share / (magnitude * rate)))
 }
 
 #[cfg(test)]
@@ -44,7 +44,7 @@ mod tests {
     const RATE: f64 = 1.0 / 12.0;
 
     fn braked(velocity: [f64; 3], force: [f64; 3]) -> Option<[f64; 3]> {
-        brake(&Vector3::from(velocity), &Vector3::from(force), RATE).map(Into::into)
+        brake(&(Vector3::from(velocity) / RATE), &Vector3::from(force), RATE).map(Into::into)
     }
 
     #[test]

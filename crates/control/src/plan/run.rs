@@ -85,8 +85,6 @@ pub(crate) struct Run<R: Real, const N: usize> {
     load: R,
     /// Speed factor that was asked for, and whether it is held to [`SLOW`].
     speed: (f32, bool),
-    /// Velocity of the plan in the last tick (m/s, world axes).
-    velocity: Vector3<R>,
 }
 
 impl<R: Real, const N: usize> Run<R, N> {
@@ -141,7 +139,6 @@ impl<R: Real, const N: usize> Run<R, N> {
             end: R::constant(1.0),
             load: R::constant(0.0),
             speed: (options.speed, false),
-            velocity: Vector3::zeros(),
         };
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
         run.rollout.set_speed_slew(None).map_err(reason)?;
@@ -202,10 +199,12 @@ impl<R: Real, const N: usize> Run<R, N> {
 
     /// Adds what takes the plan's speed against a force that was not expected. The force of this tick counts, not the
     /// smoothed one: each millisecond does.
+    #[inline(never)]
     fn brake(&self, primitive: &Primitive<R, N>, coupling: &mut Coupling<R>) {
         let Some(deviation) = &self.deviation else { return };
         let rate = primitive.movement().rate() * self.rollout.speed();
-        if let Some(taken) = brake(&self.velocity, &deviation.wrench.force, rate) {
+        let velocity = self.rollout.scaled_velocities()[0].into();
+        if let Some(taken) = brake(&velocity, &deviation.wrench.force, rate) {
             let (taken, [x, y, z]) = (taken * primitive.trust(&self.rollout), &mut coupling.poses[0].position);
             (*x, *y, *z) = (*x + taken.x, *y + taken.y, *z + taken.z);
         }
@@ -287,7 +286,6 @@ impl<R: Real, const N: usize> Run<R, N> {
             let [PoseReference { position, orientation }] = &plan.poses;
             self.goal = GoalFilter::at(Place { position: position.x, orientation: orientation.quaternion });
         }
-        self.velocity = plan.poses[0].position.v.into();
         let (posture, hand) = posture_and_hand(&plan.points.v);
         let slow = |speeds: &[R], limit: f64| {
             speeds.iter().all(|speed| *speed < R::constant(limit) && *speed > R::constant(-limit))
