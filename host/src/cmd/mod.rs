@@ -53,7 +53,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::{ArgAction, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+use clap::{ArgAction, ArgMatches, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 pub use output::Output;
 
@@ -63,7 +63,7 @@ use lab::failure::Failure;
 use lab::table::Table;
 use lab::transport::Address;
 
-use crate::config::{self as configuration, Config, Origin, Origins, seconds};
+use crate::config::{self as configuration, Config, Origin, Origins, TIMEOUT_VARIABLE, seconds};
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
 ///
@@ -106,7 +106,7 @@ pub struct Global {
     #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
     pub device: Option<String>,
     /// Longest wait for an answer of the device, s.
-    #[arg(long, global = true, env = "TACTUS_TIMEOUT", default_value = "2", value_parser = seconds, value_name = "SECONDS")]
+    #[arg(long, global = true, env = TIMEOUT_VARIABLE, default_value = "2", value_parser = seconds, value_name = "SECONDS")]
     pub timeout: Duration,
     /// File with the secret of a device that keeps one (`tactus secret`).
     #[arg(long, global = true, env = "TACTUS_SECRET_FILE", value_name = "FILE", hide_short_help = true)]
@@ -261,9 +261,7 @@ pub fn parse() -> Result<Cli, ExitCode> {
     let file = configuration::path();
     let config = file.as_deref().map_or(Ok(Config::default()), Config::read);
     let defaults = config.as_ref().ok().cloned().unwrap_or_default();
-    let mut command = defaults.defaults(Cli::command());
-    let matches = command.try_get_matches_from_mut(std::env::args_os()).map_err(|error| usage(&error))?;
-    let mut cli = Cli::from_arg_matches(&matches).map_err(|error| usage(&error.format(&mut command)))?;
+    let (mut cli, matches) = read(defaults.defaults(Cli::command()))?;
     cli.global.origins = defaults.origins(&matches, file);
     // What explains the error is not to fail with it.
     let needs_none = matches!(
@@ -274,20 +272,47 @@ pub fn parse() -> Result<Cli, ExitCode> {
             | Command::Completions(_)
             | Command::Manual(_)
     );
+    let Err(failure) = config else { return Ok(cli) };
     // An arm is not left moving because of a file that only saves typing.
-    let stops = matches!(cli.command, Command::Stop(_)) && cli.global.device.is_some();
-    match config {
-        Err(failure) if stops => {
+    if matches!(cli.command, Command::Stop(_)) {
+        let origins = &mut cli.global.origins;
+        if let (None, Some(file)) = (&cli.global.device, &origins.file) {
+            cli.global.device = Config::device_named(file);
+            origins.device = Origin::File;
+        }
+        if cli.global.device.is_some() {
             cli.global.output().warn(format!("{}: {}", failure.doing, failure.cause));
-            Ok(cli)
+            return Ok(cli);
         }
-        Err(failure) if !needs_none => Err(tell(&failure, cli.global.json)),
-        Err(failure) => {
-            cli.global.origins.problem = Some(format!("{}: {}", failure.doing, failure.cause));
-            Ok(cli)
-        }
-        _ => Ok(cli),
     }
+    if !needs_none {
+        return Err(tell(&failure, cli.global.json));
+    }
+    cli.global.origins.problem = Some(format!("{}: {}", failure.doing, failure.cause));
+    Ok(cli)
+}
+
+/// Reads the command line of this process. A time-out in the environment that is none does not prevent a stop.
+fn read(mut command: clap::Command) -> Result<(Cli, ArgMatches), ExitCode> {
+    let parsed = |command: &mut clap::Command| {
+        let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+        let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(command))?;
+        Ok::<_, clap::Error>((cli, matches))
+    };
+    // Parsing completes a command, so that what follows begins with another.
+    let another = command.clone();
+    let error = match parsed(&mut command) {
+        Ok(read) => return Ok(read),
+        Err(error) => error,
+    };
+    if let Some((problem, mut without)) = configuration::without_wrong_timeout(another)
+        && let Ok(read) = parsed(&mut without)
+        && matches!(read.0.command, Command::Stop(_))
+    {
+        read.0.global.output().warn(problem);
+        return Ok(read);
+    }
+    Err(usage(&error))
 }
 
 /// Runs what the command line asks for and reports failures; gives the exit code of the process.
