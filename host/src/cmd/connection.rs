@@ -292,6 +292,7 @@ pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
         ProcedureError::NotZeroed => ErrorCode::NotZeroed,
         ProcedureError::ZeroOfOthers => ErrorCode::ZeroUnknown,
         ProcedureError::Moves { .. } => ErrorCode::ArmMoves,
+        ProcedureError::Loaded { .. } => ErrorCode::HandLoaded,
         ProcedureError::Stopped(_) => ErrorCode::ArmStopped,
         ProcedureError::Diverted(_) => ErrorCode::Diverted,
         ProcedureError::TooLong { .. } => ErrorCode::TooLong,

@@ -17,7 +17,7 @@ pub mod export;
 pub mod faults;
 mod files;
 pub mod flash;
-mod friction;
+pub mod friction;
 pub mod get;
 pub mod hand;
 pub mod learn;
@@ -44,9 +44,10 @@ pub mod statistics;
 pub mod status;
 pub mod stop;
 mod storage;
+pub mod tare;
 pub mod teach;
 pub mod upload;
-mod weigh;
+pub mod weigh;
 
 use std::io::{IsTerminal as _, Write};
 use std::path::PathBuf;
@@ -190,9 +191,12 @@ pub enum Command {
     /// Show what the device says of itself and its arm
     #[command(after_help = examples::STATUS)]
     Status(status::Cmd),
-    /// Show or correct where the arm stands when it is zeroed
+    /// Show, measure or declare the home, weight, friction and payload of this arm
     #[command(after_help = examples::CALIBRATE)]
     Calibrate(calibrate::Cmd),
+    /// Take the present readings of force sensor and strain gauges as zero
+    #[command(after_help = examples::TARE)]
+    Tare(tare::Cmd),
     /// Initialise, open, close or move the hand
     #[command(after_help = examples::HAND)]
     Hand(hand::Cmd),
@@ -331,6 +335,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Status(command) => status::run(&command, &global),
         Command::Faults(command) => faults::run(&command, &global),
         Command::Calibrate(command) => calibrate::run(&command, &global),
+        Command::Tare(command) => tare::run(&command, &global),
         Command::Monitor(command) => monitor::run(&command, &global),
         Command::Record(command) => record::run(&command, &global),
         Command::Learn(command) => learn::run(&command, &global),
