@@ -10,7 +10,7 @@ use link::{HomeSource, Refusal, Secret, SecretState, Status};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
-use super::{ErrorCode, Failure, Global, Output};
+use super::{ErrorCode, Failure, Global, Output, interruption};
 use lab::client::{Client, Halted, Interrupt};
 use lab::device::{Device, OpenError};
 use lab::error::{HostError, explain_blocked};
@@ -340,6 +340,7 @@ pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure
             ErrorCode::FileFailed => ErrorCode::BusLogFile,
             code => code,
         },
+        SimulationError::BoardReport(cause) => cause.code(),
         SimulationError::Flash(..) => return Failure::of_file(ErrorCode::FlashFile, doing, error),
         SimulationError::Faults(..) => ErrorCode::FaultScript,
         _ => ErrorCode::SimulatorFailed,
@@ -367,6 +368,7 @@ pub(super) fn interrupt() -> Interrupt {
     let flag = interrupt.flag();
     match Signals::new([SIGINT, SIGTERM, SIGHUP]) {
         Ok(mut signals) => {
+            interruption::leave_to_another();
             std::thread::spawn(move || {
                 let mut first: Option<Instant> = None;
                 for _ in signals.forever() {

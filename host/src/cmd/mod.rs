@@ -20,6 +20,7 @@ pub mod flash;
 pub mod friction;
 pub mod get;
 pub mod hand;
+mod interruption;
 pub mod learn;
 pub mod list;
 pub mod logs;
@@ -72,7 +73,7 @@ use crate::config::{self as configuration, Config, Origin, Origins, TIMEOUT_VARI
 /// 3 device not found, 4 incompatible versions, 5 device refused or faulted, 6 validation failed, 7 link lost,
 /// 130 interrupted after a confirmed stop.
 #[derive(Debug, Parser)]
-#[command(name = "tactus", version, propagate_version = true, disable_help_flag = true, after_help = examples::ALL)]
+#[command(name = "tactus", version, propagate_version = true, disable_help_flag = true, disable_version_flag = true, after_help = examples::ALL)]
 pub struct Cli {
     /// Options of every command.
     #[command(flatten)]
@@ -84,6 +85,7 @@ pub struct Cli {
 
 /// Options that every command has.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Options of every command")]
 pub struct Global {
     /// Write data as JSON: one object, or one a line for streams.
     #[arg(long, global = true)]
@@ -92,7 +94,7 @@ pub struct Global {
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// Never ask; what would be asked is refused.
-    #[arg(long, global = true)]
+    #[arg(long, global = true, hide_short_help = true)]
     pub non_interactive: bool,
     /// Replace files that exist.
     #[arg(long, global = true)]
@@ -103,6 +105,9 @@ pub struct Global {
     /// Show the help with every explanation.
     #[arg(long, global = true, action = ArgAction::HelpLong, hide_short_help = true)]
     pub help_all: Option<bool>,
+    /// Print the version.
+    #[arg(long, short = 'V', global = true, action = ArgAction::Version)]
+    pub version: Option<bool>,
     /// The device, such as `sil:` or `serial:PATH`; `tactus --help` lists them.
     #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
     pub device: Option<String>,
@@ -122,6 +127,13 @@ impl Global {
     fn is_simulated_here(&self) -> bool {
         let address = self.device.as_deref().map(str::parse::<Address>);
         matches!(address, Some(Ok(Address::Simulated(..))))
+    }
+
+    /// True if the device is simulated in this process and keeps nothing in a file: what it stores ends with the
+    /// command.
+    fn forgets(&self) -> bool {
+        let address = self.device.as_deref().map(str::parse::<Address>);
+        matches!(address, Some(Ok(Address::Simulated(_, options))) if options.flash.is_none())
     }
 
     /// The address that the options name, if any.
@@ -321,6 +333,7 @@ fn read(mut command: clap::Command) -> Result<(Cli, ArgMatches), ExitCode> {
 
 /// Runs what the command line asks for and reports failures; gives the exit code of the process.
 pub fn run(cli: Cli) -> ExitCode {
+    interruption::clear_away();
     let global = cli.global;
     let result = match cli.command {
         Command::Sim(command) => sim::run(&command, &global),
