@@ -282,11 +282,8 @@ fn open_part(place: &Path) -> io::Result<(PathBuf, File)> {
         let mut part = place.as_os_str().to_owned();
         part.push(if number == 1 { ".part".to_owned() } else { format!(".{number}.part") });
         let part = PathBuf::from(part);
-        match OpenOptions::new().write(true).create_new(true).open(&part) {
-            Ok(file) => {
-                unfinished::begin(&part);
-                return Ok((part, file));
-            }
+        match unfinished::create(&part) {
+            Ok(file) => return Ok((part, file)),
             Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => taken = cause,
             Err(cause) => return Err(cause),
         }

@@ -1,5 +1,7 @@
 //! Unfinished files of this process, for whoever ends it before anything worth keeping is in them.
 
+use std::fs::{File, OpenOptions};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -9,9 +11,12 @@ fn files() -> MutexGuard<'static, Vec<PathBuf>> {
     FILES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A file is begun.
-pub(crate) fn begin(file: &Path) {
-    files().push(file.to_owned());
+/// Begins a file that does not exist; whoever takes all of them away meanwhile waits for this one.
+pub(crate) fn create(file: &Path) -> io::Result<File> {
+    let mut files = files();
+    let created = OpenOptions::new().write(true).create_new(true).open(file)?;
+    files.push(file.to_owned());
+    Ok(created)
 }
 
 /// It is at its place, is kept, or is gone.

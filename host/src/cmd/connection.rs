@@ -150,7 +150,16 @@ fn reach(
         adjust(options);
     };
     let device = Device::open(&address, adjust).map_err(|error| match error {
-        OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),
+        OpenError::Transport(error) => {
+            let failure = HostError::Transport(error).into_failure(doing);
+            match (failure.code, &address) {
+                (ErrorCode::DeviceNotFound, Address::Unix(_) | Address::Tcp(_)) => failure.help(format!(
+                    "nobody serves there: `tactus sim --listen {address}` serves a simulated arm, in a terminal of its \
+                     own"
+                )),
+                _ => failure,
+            }
+        }
         OpenError::Simulation(error) => simulation_failure(error, doing),
     })?;
     Ok((device, owner(matches!(address, Address::Simulated(..)))))

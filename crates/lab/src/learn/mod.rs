@@ -15,6 +15,7 @@ pub mod report;
 use std::path::{Path, PathBuf};
 
 use control::plan::bounds::{DISPLACEMENT, GAIN};
+use control::plan::load::{LONGEST_MOVEMENT, SHORTEST_MOVEMENT};
 use control::plan::primitive::Reference;
 use dmp::fit::{LARGEST_ANGLE, LARGEST_ROTATION_VECTOR, WARNING_ANGLE};
 use thiserror::Error;
@@ -179,6 +180,10 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
         });
     }
     demonstration.rest(options.dwell);
+    let duration = demonstration.duration();
+    if !(SHORTEST_MOVEMENT..=LONGEST_MOVEMENT).contains(&duration) {
+        return Err(DemonstrationError::Duration { file: recording.file.clone(), duration }.into());
+    }
     let mut warnings: Vec<String> = slow_ends(&demonstration).collect();
     if let Some(crept) = demonstration.crept.filter(|crept| *crept >= LEAST_CREPT) {
         warnings.push(format!(
