@@ -172,18 +172,14 @@ const WORST_REPRODUCTION: (f64, f64) = (0.03, 10.0 * std::f64::consts::PI / 180.
 pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Result<Learned, LearnError> {
     check_options(options)?;
     let mut demonstration = Demonstration::prepare(recording, &options.preparation)?;
-    let moving_end = demonstration.speed().last().is_some_and(|speed| *speed > MOVING_END);
-    if options.dwell > 0.0 && moving_end {
+    if options.dwell > 0.0 && demonstration.speed().last().is_some_and(|speed| *speed > MOVING_END) {
         return Err(LearnError::Option {
             option: "--dwell",
             reason: "the demonstration ends in motion, and nothing can rest behind that".to_owned(),
         });
     }
     demonstration.rest(options.dwell);
-    let duration = demonstration.duration();
-    if !(SHORTEST_MOVEMENT..=LONGEST_MOVEMENT).contains(&duration) {
-        return Err(DemonstrationError::Duration { file: recording.file.clone(), duration }.into());
-    }
+    check_duration(recording, demonstration.duration())?;
     let mut warnings: Vec<String> = slow_ends(&demonstration).collect();
     if let Some(crept) = demonstration.crept.filter(|crept| *crept >= LEAST_CREPT) {
         warnings.push(format!(
@@ -265,6 +261,14 @@ fn slow_ends(demonstration: &Demonstration) -> impl Iterator<Item = String> {
             )
         },
     )
+}
+
+/// Refuses what the control code would not play.
+fn check_duration(recording: &Recording, duration: f64) -> Result<(), DemonstrationError> {
+    if (SHORTEST_MOVEMENT..=LONGEST_MOVEMENT).contains(&duration) {
+        return Ok(());
+    }
+    Err(DemonstrationError::Duration { file: recording.file.clone(), duration })
 }
 
 /// Refuses values that are out of range.
