@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use clap::builder::Resettable;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command};
 use lab::error_code::ErrorCode;
@@ -11,6 +12,9 @@ use lab::failure::Failure;
 use lab::input_file;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// The variable of `--timeout`.
+pub const TIMEOUT_VARIABLE: &str = "TACTUS_TIMEOUT";
 
 /// Content of the file.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -85,9 +89,23 @@ impl Config {
         Ok(config)
     }
 
-    /// The command line with these defaults.
+    /// The device that a file names which cannot be used for something else in it: for a stop, which shall not fail
+    /// with a file that only saves typing.
+    #[must_use]
+    pub fn device_named(path: &Path) -> Option<String> {
+        let table: toml::Table = input_file::read_text(path).ok()?.parse().ok()?;
+        table.get("device")?.as_str().map(str::to_owned)
+    }
+
+    /// The command line with these defaults. An empty variable of the environment counts as none.
     #[must_use]
     pub fn defaults(&self, mut command: Command) -> Command {
+        for option in ["device", "timeout", "secret_file"] {
+            command = command.mut_arg(option, |argument| {
+                let is_empty = argument.get_env().and_then(std::env::var_os).is_some_and(|value| value.is_empty());
+                if is_empty { argument.env(Resettable::Reset) } else { argument }
+            });
+        }
         let timeout = self.timeout.map(|timeout| timeout.to_string());
         let values = [("device", self.device.clone()), ("timeout", timeout), ("secret_file", self.secret_file.clone())];
         for (option, value) in values {
@@ -116,6 +134,15 @@ impl Config {
         let timeout = origin("timeout", self.timeout.is_some());
         Origins { file, problem: None, device, timeout, secret_file: origin("secret_file", self.secret_file.is_some()) }
     }
+}
+
+/// The variable with a time-out, if its value is none: what it says, and the command line without it.
+#[must_use]
+pub fn without_wrong_timeout(command: Command) -> Option<(String, Command)> {
+    let value = std::env::var_os(TIMEOUT_VARIABLE)?;
+    let cause = value.to_str().map_or(Err("it is no Unicode".to_owned()), seconds).err()?;
+    let command = command.mut_arg("timeout", |argument| argument.env(Resettable::Reset));
+    Some((format!("{TIMEOUT_VARIABLE} is ignored: {cause}"), command))
 }
 
 /// Shortest time that a setting may ask for: no line answers sooner.

@@ -7,15 +7,24 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 
 use crate::cmd::{
-    config, delete, doctor, experiment, explain, export, get, hand, learn, list, manual, payload, plot, record,
-    rehearse, rename, report, run_report, secret, settings, sim, statistics, stop, teach, upload,
+    calibrate, can, config, delete, doctor, experiment, explain, export, faults, flash, friction, get, hand, learn,
+    list, manual, payload, plot, record, rehearse, rename, report, run_report, secret, settings, sim, statistics,
+    status, stop, teach, upload, weigh,
 };
+use crate::monitor;
 
 /// Every schema by the name of its command; `error` is that of any command that fails.
 #[must_use]
 pub fn all() -> Vec<(&'static str, Schema)> {
     vec![
+        ("calibrate", of::<calibrate::HomeShown>()),
+        ("calibrate-friction", of::<friction::Measured>()),
+        ("calibrate-gravity", of::<weigh::Weighed>()),
+        ("calibrate-gravity-show", of::<weigh::WeightShown>()),
+        ("calibrate-home", of::<calibrate::HomeCorrected>()),
         ("calibrate-payload", of::<payload::data::Measured>()),
+        ("calibrate-payload-show", of::<payload::PayloadShown>()),
+        ("can-decode", of::<can::decode::Decoded<'_>>()),
         ("can-replay", of::<lab::replay::Outcome>()),
         ("check", of::<crate::check::CheckReport>()),
         ("compare", of::<lab::difference::Difference>()),
@@ -28,13 +37,17 @@ pub fn all() -> Vec<(&'static str, Schema)> {
         ("statistics", of::<statistics::Known<'_>>()),
         ("experiment", of::<experiment::Tried>()),
         ("experiment-study", of::<experiment::Studied>()),
+        ("experiment-lift", of::<experiment::Lifted>()),
         ("explain", of::<explain::Explained>()),
         ("export", of::<export::Exported>()),
+        ("faults", of::<faults::FaultReport>()),
+        ("flash", of::<flash::Flashed>()),
         ("get", of::<get::Gotten>()),
         ("hand", of::<hand::Moved>()),
         ("learn", of::<learn::Fitted<'_>>()),
         ("list", of::<list::Listed>()),
         ("manual", of::<manual::Written>()),
+        ("monitor", of::<monitor::Streamed>()),
         ("plot", of::<plot::Drawn>()),
         ("record", of::<record::Recorded>()),
         ("rehearse", of::<rehearse::Report>()),
@@ -44,7 +57,9 @@ pub fn all() -> Vec<(&'static str, Schema)> {
         ("secret", of::<secret::Shown>()),
         ("secret-new", of::<secret::Drawn>()),
         ("sim", of::<sim::Simulated>()),
+        ("status", of::<status::StatusReport>()),
         ("stop", of::<stop::Stopped>()),
+        ("tare", of::<lab::procedure::Tared>()),
         ("teach", of::<teach::Taught>()),
         ("upload", of::<upload::Uploaded>()),
     ]

@@ -102,13 +102,13 @@ fn a_screen_that_is_too_small_says_so() {
 
 #[test]
 fn what_is_not_known_is_null_for_a_script() {
-    let idle = watch().to_json();
+    let idle = serde_json::to_value(watch().line()).unwrap();
     for key in
         ["fault", "loaded", "progress", "cycle", "q_rad", "wrench_N_Nm", "hand_rad", "surprise", "computation_us"]
     {
         assert!(idle[key].is_null(), "{key}: {}", idle[key]);
     }
-    let fault = fault().to_json();
+    let fault = serde_json::to_value(fault().line()).unwrap();
     assert_eq!((&fault["state"], &fault["fault"]), (&"soft stop".into(), &"ContactForce".into()));
     assert_eq!((&fault["cycle"], &fault["adaptation"]), (&45_123.into(), &"at its limits".into()));
 }

@@ -7,6 +7,7 @@ use puck::{
     Action, CanFrame, Counts, Destination, Group, Node, Property, PropertyId, Reply, ReplyError, Request, RequestError,
     force_torque, tactile,
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::candump::AnyFrame;
@@ -18,7 +19,7 @@ use crate::value::{self, Reading};
 const NODES: usize = 32;
 
 /// The kind of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// The host asks for a property.
@@ -93,7 +94,7 @@ impl Kind {
 }
 
 /// The meaning of a frame.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Meaning {
     /// Its kind.
     pub kind: Kind,

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use puck::{Action, CanFrame, Destination, Group, Node, PropertyId, Reply, Request};
+use schemars::JsonSchema;
 use serde::Serialize;
 use sim::wire::frame_bits;
 
@@ -274,7 +275,7 @@ fn bits(frame: &AnyFrame) -> u32 {
 }
 
 /// Frames of one kind.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct KindSummary {
     /// The kind.
     pub kind: Kind,
@@ -287,7 +288,7 @@ pub struct KindSummary {
 }
 
 /// Questions to one node and its answers.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NodeSummary {
     /// Its name.
     pub name: String,
@@ -309,7 +310,7 @@ pub struct NodeSummary {
 }
 
 /// Regularity of the control cycle, by its position requests.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CycleSummary {
     /// Their number.
     pub cycles: u64,
@@ -326,7 +327,7 @@ pub struct CycleSummary {
 }
 
 /// Summary of one interface.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
     /// Its name.
     pub interface: String,

@@ -3,12 +3,13 @@
 use puck::hand::HandCommand;
 use puck::safety::{Button, Health};
 use puck::{MotorMode, Node, PendantState, Property, PropertyId, Role, SafetyMode, Status, gauge};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::puck_state::PuckState;
 
 /// One number off the bus with what it means.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Reading {
     /// The member of several values that it is, e.g. `x` or `M3`; empty if it stands alone.
     #[serde(skip_serializing_if = "str::is_empty")]

@@ -9,6 +9,7 @@
 
 #[cfg(feature = "mujoco")]
 pub mod calibrated;
+pub mod carried;
 pub mod comparison;
 #[cfg(feature = "mujoco")]
 pub mod config;

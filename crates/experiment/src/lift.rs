@@ -4,8 +4,7 @@
 //! carried with the memory of it, and the heavier one also with the memory of the usual one: what that sags is what
 //! the memory is good for.
 
-use serde::Serialize;
-
+use super::carried::Carried;
 use super::config::Config;
 use super::preparation::{self, PreparationError};
 use super::quantile::quantile;
@@ -77,31 +76,6 @@ impl Case {
     pub fn rehearsed_as(self) -> Case {
         if self == Case::Unexpected { Case::Usual } else { self }
     }
-}
-
-/// The result of one case in one mode.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Carried {
-    /// The case.
-    pub case: &'static str,
-    /// Mass that is remembered, kg.
-    pub remembered_kg: f64,
-    /// Mass that is carried, kg.
-    pub carried_kg: f64,
-    /// The mode.
-    pub mode: super::Mode,
-    /// Trials.
-    pub trials: usize,
-    /// Trials in which it was held.
-    pub held: usize,
-    /// Distance of the hand below its plan when it has lifted, m: median over the trials.
-    pub sag_median_m: f64,
-    /// The same, the worst trial.
-    pub sag_max_m: f64,
-    /// Distance of the free hand below or above its plan before it touches the weight, m: median over the trials.
-    pub free_sag_median_m: f64,
-    /// The same, the worst trial.
-    pub free_sag_max_m: f64,
 }
 
 /// The figures of a case, mode by mode; `mass` is the factor on the usual mass in all cases.

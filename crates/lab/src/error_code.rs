@@ -342,6 +342,10 @@ error_codes! {
     EmptyHandInvalid = 654: "the report of the empty hand cannot be used",
         "it is of another arm or of another calibration, or was not believed",
         "empty the hand, then `tactus calibrate payload --measure --report FILE` makes one";
+    HandLoaded = 655: "a force acts on the hand that a tare would make nothing",
+        "the hand holds or touches something, or the sensor is adrift by more than 1 N",
+        "empty the hand and let nothing touch it, then `tactus tare` again; if the force is the sensor's error, or a load that \
+         shall count as nothing, `tactus tare --loaded`";
     OutOfReach = 660: "the arm does not reach the object in every cell", "the grid is larger than the arm's reach",
         "leave these cells out, for example with `--grid 4x3` or a list of `--cells`";
     ResultsDamaged = 661: "the results in the folder cannot be read", "a line was changed or cut",

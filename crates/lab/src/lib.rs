@@ -32,4 +32,5 @@ pub mod startup_guide;
 pub mod table;
 pub mod tracking;
 pub mod transport;
+pub mod unfinished;
 pub mod weigh;

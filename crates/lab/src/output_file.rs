@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use crate::error_code::ErrorCode;
+use crate::unfinished;
 
 /// Most unfinished files of one name that lie beside it; there are more only if nobody ever looks.
 const MOST_UNFINISHED: u32 = 99;
@@ -92,15 +93,9 @@ impl OutputFile {
     /// [`OutputError`]; nothing was changed.
     pub fn create(target: &Path, force: bool, inputs: &[&Path]) -> Result<Self, OutputError> {
         let system = |cause| OutputError::System { file: target.to_owned(), cause };
-        let (place, before) = inspect(target)?;
-        if let Some(before) = &before {
-            refuse_inputs(target, before, inputs)?;
-            if !force {
-                return Err(OutputError::Exists { file: target.to_owned() });
-            }
-            if before.permissions().readonly() {
-                return Err(system(io::ErrorKind::PermissionDenied.into()));
-            }
+        let (place, before) = may_write(target, force, inputs)?;
+        if before.as_ref().is_some_and(|before| before.permissions().readonly()) {
+            return Err(system(io::ErrorKind::PermissionDenied.into()));
         }
         let (part, file) = open_part(&place).map_err(system)?;
         let this = Self { target: place, part, output: Some(BufWriter::new(file)), replaces: force };
@@ -116,6 +111,7 @@ impl OutputFile {
     /// [`OutputError`]; what was written so far is in [`part`](Self::part), which stays.
     pub fn commit(mut self) -> Result<PathBuf, OutputError> {
         let result = self.put();
+        unfinished::end(&self.part);
         // Whether it is at its place or stays beside it: there is nothing to clear away.
         self.output = None;
         result.map(|()| self.target.clone())
@@ -140,6 +136,7 @@ impl OutputFile {
         if let Some(mut output) = self.output.take() {
             let _ = output.flush();
         }
+        unfinished::end(&self.part);
         self.part.clone()
     }
 
@@ -166,6 +163,7 @@ impl Drop for OutputFile {
             // Its last bytes need not be written any more.
             drop(output.into_parts());
             let _ = fs::remove_file(&self.part);
+            unfinished::end(&self.part);
         }
     }
 }
@@ -196,13 +194,7 @@ pub fn apart<'a>(targets: impl IntoIterator<Item = &'a Path>) -> Result<(), Outp
 /// # Errors
 /// [`OutputError`]; an existing regular file is replaced only with `force`, and none of `inputs` ever is.
 pub fn create_log(target: &Path, force: bool, inputs: &[&Path]) -> Result<File, OutputError> {
-    let (place, before) = inspect(target)?;
-    if let Some(before) = &before {
-        refuse_inputs(target, before, inputs)?;
-        if !force {
-            return Err(OutputError::Exists { file: target.to_owned() });
-        }
-    }
+    let (place, _) = may_write(target, force, inputs)?;
     let opened = OpenOptions::new().write(true).create(true).truncate(false).open(place).and_then(|file| {
         // Two programs at one log would each write over the other's lines.
         file.try_lock().map_err(|cause| match cause {
@@ -227,6 +219,26 @@ pub fn replace(target: &Path, bytes: &[u8]) -> Result<(), OutputError> {
         // The content is at hand: half of it helps nobody.
         let _ = fs::remove_file(part);
     })
+}
+
+/// Refuses a file that another program is to write for this one, as [`OutputFile::create`] does.
+///
+/// # Errors
+/// [`OutputError`]
+pub fn refuse(target: &Path, force: bool, inputs: &[&Path]) -> Result<(), OutputError> {
+    may_write(target, force, inputs).map(|_| ())
+}
+
+/// The place of a file that may be written, and what is there.
+fn may_write(target: &Path, force: bool, inputs: &[&Path]) -> Result<(PathBuf, Option<Metadata>), OutputError> {
+    let (place, before) = inspect(target)?;
+    if let Some(before) = &before {
+        refuse_inputs(target, before, inputs)?;
+        if !force {
+            return Err(OutputError::Exists { file: target.to_owned() });
+        }
+    }
+    Ok((place, before))
 }
 
 /// The place behind links, and what is there.
@@ -270,7 +282,7 @@ fn open_part(place: &Path) -> io::Result<(PathBuf, File)> {
         let mut part = place.as_os_str().to_owned();
         part.push(if number == 1 { ".part".to_owned() } else { format!(".{number}.part") });
         let part = PathBuf::from(part);
-        match OpenOptions::new().write(true).create_new(true).open(&part) {
+        match unfinished::create(&part) {
             Ok(file) => return Ok((part, file)),
             Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => taken = cause,
             Err(cause) => return Err(cause),

@@ -10,6 +10,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use elf::{elf, real};
+use lab::output_file::OutputError;
 use lab::simulation::{
     BoardCan, BoardEngine, Engine, FlashSource, Simulation, SimulationError, SimulationOptions, WorldKind,
 };
@@ -54,6 +55,27 @@ fn options(folder: &Path) -> SimulationOptions {
 
 fn start(options: &SimulationOptions) -> Result<Simulation, SimulationError> {
     Simulation::start(options)
+}
+
+#[test]
+fn a_report_replaces_no_file_unless_it_is_forced_and_never_what_is_read() {
+    let folder = laboratory("nucleo-h743zi2", "exit 3");
+    let (report, flash) = (folder.path().join("report.json"), folder.path().join("bank2"));
+    fs::write(&report, "precious").unwrap();
+    fs::write(&flash, "precious").unwrap();
+    let mut options = options(folder.path());
+    options.board_report = Some(report.clone());
+    assert!(matches!(refused(&options), SimulationError::BoardReport(OutputError::Exists { .. })));
+    options.replace_logs = true;
+    assert!(!matches!(refused(&options), SimulationError::BoardReport(_)));
+    options.flash = FlashSource::File(flash.clone());
+    options.board_report = Some(flash.clone());
+    assert!(matches!(refused(&options), SimulationError::BoardReport(OutputError::IsInput { .. })));
+    options.board_report = Some(folder.path().to_owned());
+    assert!(matches!(refused(&options), SimulationError::BoardReport(OutputError::NotAFile { .. })));
+    for file in [report, flash] {
+        assert_eq!(fs::read(file).unwrap(), b"precious");
+    }
 }
 
 fn refused(options: &SimulationOptions) -> SimulationError {

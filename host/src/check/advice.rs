@@ -6,7 +6,7 @@ use std::path::Path;
 use lab::procedure::{Change, ChangeKind};
 use link::Goal;
 
-use super::{CheckReport, Course, Limit};
+use super::{CheckReport, Course, Limit, UNFIT};
 
 /// Slowest run, as a factor of the taught speed.
 const SLOWEST: f64 = 0.1;
@@ -31,7 +31,11 @@ impl CheckReport {
         }
         // The fingers were not shown: options of `learn` gave their angles.
         let of_hand = broken().next().is_some() && broken().all(|margin| margin.limit == Limit::HandPosition);
-        let last = if of_hand {
+        let is_unfit =
+            broken().next().is_none() && self.violations.iter().any(|violation| violation.starts_with(UNFIT));
+        let last = if is_unfit {
+            "no speed and no goal helps: learn it again, from another demonstration or with other options"
+        } else if of_hand {
             "learn it again with other angles of the hand (`--hand-start`, `--hand-goal`)"
         } else {
             "show the movement farther from the limits and learn it again"

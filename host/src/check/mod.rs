@@ -333,14 +333,15 @@ fn check_plan(primitive: &lab::primitive_file::HostPrimitive, report: &mut Check
     }
 }
 
+/// Begin of the violation of a primitive that no run of it could mend.
+const UNFIT: &str = "the control code refuses the primitive";
+
 /// The plan as the arm follows it.
 fn check_run(file: &PrimitiveFile, course: &Course, run: &ClosedLoop, report: &mut CheckReport) {
     match run.ending {
         Ending::Arrived => {}
-        Ending::Unfit(reason) => report.violations.push(format!("the control code refuses the primitive: {reason}")),
-        Ending::NotLoaded(reason) => {
-            report.violations.push(format!("the control code refuses the primitive: {reason}"))
-        }
+        Ending::Unfit(reason) => report.violations.push(format!("{UNFIT}: {reason}")),
+        Ending::NotLoaded(reason) => report.violations.push(format!("{UNFIT}: {reason}")),
         Ending::Refused(reason) => report.violations.push(format!("the control code refuses the run: {reason}")),
         Ending::Stopped(state, fault) => {
             let time = run.samples.last().map_or(0.0, |sample| sample.time);

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, Subcommand};
 use link::{Calibration, Refusal};
+use schemars::JsonSchema;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::calibration_report::CalibrationReport;
@@ -146,13 +148,44 @@ fn show(client: &mut Client<Device>, global: &Global) -> Result<(), Failure> {
             zeroed_at,
         ]);
     }
-    global.output().result(
-        &json!({
-            "home_rad": home, "stored": source == link::HomeSource::Stored, "source": source.name(),
-            "model_rad": control::model::HOME, "zeroed_at_rad": zeroed_at,
-        }),
-        format!("{table}home: {}", source.name()),
-    )
+    let data = HomeShown {
+        home_rad: home.map(f64::from),
+        stored: source == link::HomeSource::Stored,
+        source: source.name(),
+        model_rad: control::model::HOME,
+        zeroed_at_rad: zeroed_at.map(|posture| posture.map(f64::from)),
+    };
+    global.output().result(&data, format!("{table}home: {}", source.name()))
+}
+
+/// Data of `tactus --json calibrate show`, `home --set` and `forget`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct HomeShown {
+    /// Home of the next zeroing, rad.
+    pub home_rad: Posture,
+    /// It is this arm's own, stored in the device.
+    pub stored: bool,
+    /// Whose home it is.
+    pub source: &'static str,
+    /// Home of the robot model, rad.
+    pub model_rad: Posture,
+    /// Where the last zeroing took the arm to stand, rad; null if the device does not know.
+    pub zeroed_at_rad: Option<Posture>,
+}
+
+/// Data of `tactus --json calibrate home --here`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct HomeCorrected {
+    /// Angles that the arm read, rad.
+    pub read_rad: Posture,
+    /// Angles that it really stands at, rad.
+    pub true_rad: Posture,
+    /// The one less the other, rad.
+    pub difference_rad: Posture,
+    /// Where the last zeroing took the arm to stand, rad.
+    pub home_before_rad: Posture,
+    /// The home that is stored now, rad.
+    pub home_rad: Posture,
 }
 
 /// A difference in rad and degrees.
@@ -177,9 +210,12 @@ fn table(correction: &HomeCorrection) -> Table {
 }
 
 fn data(correction: &HomeCorrection) -> Value {
-    let difference: Vec<f64> = correction.truth.iter().zip(correction.read).map(|(truth, read)| truth - read).collect();
-    json!({
-        "read_rad": correction.read, "true_rad": correction.truth, "difference_rad": difference,
-        "home_before_rad": correction.zeroed_at, "home_rad": correction.home,
+    let HomeCorrection { zeroed_at, read, truth, home } = correction;
+    json!(HomeCorrected {
+        read_rad: *read,
+        true_rad: *truth,
+        difference_rad: std::array::from_fn(|joint| truth[joint] - read[joint]),
+        home_before_rad: zeroed_at.map(f64::from),
+        home_rad: home.map(f64::from),
     })
 }

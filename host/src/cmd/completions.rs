@@ -24,5 +24,5 @@ pub fn run(command: &Cmd) -> Result<(), Failure> {
     clap_complete::generate(command.shell, &mut Cli::command(), "tactus", &mut text);
     let mut stdout = std::io::stdout().lock();
     let written = stdout.write_all(&text).and_then(|()| stdout.flush());
-    written.map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, "completions", cause))
+    written.map_err(|cause| Failure::of_file(ErrorCode::ResultNotWritten, "completions", cause))
 }

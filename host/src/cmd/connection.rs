@@ -10,7 +10,7 @@ use link::{HomeSource, Refusal, Secret, SecretState, Status};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
-use super::{ErrorCode, Failure, Global, Output};
+use super::{ErrorCode, Failure, Global, Output, interruption};
 use lab::client::{Client, Halted, Interrupt};
 use lab::device::{Device, OpenError};
 use lab::error::{HostError, explain_blocked};
@@ -150,7 +150,16 @@ fn reach(
         adjust(options);
     };
     let device = Device::open(&address, adjust).map_err(|error| match error {
-        OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),
+        OpenError::Transport(error) => {
+            let failure = HostError::Transport(error).into_failure(doing);
+            match (failure.code, &address) {
+                (ErrorCode::DeviceNotFound, Address::Unix(_) | Address::Tcp(_)) => failure.help(format!(
+                    "nobody serves there: `tactus sim --listen {address}` serves a simulated arm, in a terminal of its \
+                     own"
+                )),
+                _ => failure,
+            }
+        }
         OpenError::Simulation(error) => simulation_failure(error, doing),
     })?;
     Ok((device, owner(matches!(address, Address::Simulated(..)))))
@@ -292,6 +301,7 @@ pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
         ProcedureError::NotZeroed => ErrorCode::NotZeroed,
         ProcedureError::ZeroOfOthers => ErrorCode::ZeroUnknown,
         ProcedureError::Moves { .. } => ErrorCode::ArmMoves,
+        ProcedureError::Loaded { .. } => ErrorCode::HandLoaded,
         ProcedureError::Stopped(_) => ErrorCode::ArmStopped,
         ProcedureError::Diverted(_) => ErrorCode::Diverted,
         ProcedureError::TooLong { .. } => ErrorCode::TooLong,
@@ -339,6 +349,7 @@ pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure
             ErrorCode::FileFailed => ErrorCode::BusLogFile,
             code => code,
         },
+        SimulationError::BoardReport(cause) => cause.code(),
         SimulationError::Flash(..) => return Failure::of_file(ErrorCode::FlashFile, doing, error),
         SimulationError::Faults(..) => ErrorCode::FaultScript,
         _ => ErrorCode::SimulatorFailed,
@@ -366,6 +377,7 @@ pub(super) fn interrupt() -> Interrupt {
     let flag = interrupt.flag();
     match Signals::new([SIGINT, SIGTERM, SIGHUP]) {
         Ok(mut signals) => {
+            interruption::leave_to_another();
             std::thread::spawn(move || {
                 let mut first: Option<Instant> = None;
                 for _ in signals.forever() {

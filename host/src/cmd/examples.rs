@@ -88,6 +88,11 @@ Examples:
   tactus --device sil:world=simple,arm=9 calibrate friction
   tactus --device unix:tactus.sock calibrate payload hand
   tactus --device sil:world=simple,arm=9,held=0.3 calibrate payload --measure";
+/// `tare`
+pub(super) const TARE: &str = "\
+Examples:
+  tactus --device unix:tactus.sock tare
+  tactus --device unix:tactus.sock tare --loaded";
 /// `hand`
 pub(super) const HAND: &str = "\
 Examples:

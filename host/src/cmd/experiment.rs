@@ -104,6 +104,17 @@ pub struct Tried {
     pub comparison: Option<Comparison>,
 }
 
+/// Data of `tactus --json experiment lift`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Lifted {
+    /// Which experiment.
+    pub experiment: Scenario,
+    /// The folder of its results.
+    pub folder: String,
+    /// Figures of each case in each mode.
+    pub cases: Vec<experiment::carried::Carried>,
+}
+
 /// Data of `tactus --json experiment` with `--demonstrations` or `--sweep`.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Studied {
@@ -390,10 +401,11 @@ mod work {
         figures::write_lift(&rows, config.grid.cells.len() * config.seeds.len(), &file)
             .map_err(|cause| Failure::new(ErrorCode::ExperimentFigure, "experiment: a figure cannot be made", cause))?;
         output.say(format!("wrote {}", file.join("sag.png").display()));
-        let data = serde_json::json!({ "experiment": config.scenario, "folder": files::text(&out), "cases": rows });
+        let text = lift::table(&rows);
+        let data = Lifted { experiment: config.scenario, folder: files::text(&out), cases: rows };
         let file = out.join("results.json");
         save(&file, &data)?;
-        output.result(&data, lift::table(&rows))
+        output.result(&data, text)
     }
 
     /// The modes that are asked for, if any are.

@@ -1,5 +1,7 @@
 //! `tactus faults`: the present fault and the last one, what to do about them, and the second before it.
 
+mod data;
+
 use std::path::PathBuf;
 
 use clap::Args;
@@ -11,7 +13,8 @@ use lab::table::Table;
 use link::{Status, Telemetry};
 use puck::PendantState;
 use puck::safety::Health;
-use serde_json::{Value, json};
+
+pub use data::FaultReport;
 
 use super::{ErrorCode, Failure, Global, connection, files};
 
@@ -58,46 +61,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if last.is_none() && global.is_simulated_here() {
         words += &format!("; {SWITCHED_ON}");
     }
-    output.result(&data(&status, last.as_ref()), words)
-}
-
-/// The present fault, the last one with its cycles, and the pendant, for a script.
-pub(super) fn data(status: &Status, last: Option<&LastSecond>) -> Value {
-    json!({
-        "present": fault_data(status.fault),
-        "last": last.map(|last| json!({
-            "number": last.record.number,
-            "fault": fault_data(last.record.fault),
-            "restart": last.record.fault == 0,
-            "latched": last.record.latched,
-            "damaged_cycles": usize::from(last.record.cycles) - last.cycles.len(),
-            "cycles": last.cycles.iter().map(cycle_data).collect::<Vec<_>>(),
-        })),
-        "pendant": pendant(status).map(|state| json!({
-            "supervised": SUPERVISED.iter().zip(state.health()).map(|(name, health)| (*name, health_name(health)))
-                .collect::<std::collections::BTreeMap<_, _>>(),
-            "display": state.display(), "idle_light": state.idle_light, "activate_light": state.activate_light,
-            "button": format!("{:?}", state.button),
-        })),
-        "pendant_word": status.pendant,
-    })
-}
-
-fn fault_data(code: u8) -> Option<Value> {
-    let fault = Fault::from_code(code).filter(|fault| *fault != Fault::None)?;
-    let FaultGuide { cause, check, clear, .. } = FaultGuide::of(fault);
-    Some(json!({
-        "code": code, "name": format!("{fault:?}"), "meaning": fault.explanation(),
-        "cause": cause, "check": check, "clear": clear,
-    }))
-}
-
-fn cycle_data(cycle: &Telemetry) -> Value {
-    json!({
-        "cycle": cycle.cycle, "state": state(cycle), "fault": cycle.fault, "flags": cycle.flags, "phase": cycle.phase,
-        "q_rad": cycle.q, "dq_rad_per_s": cycle.dq, "tau_nm": cycle.tau, "wrench": cycle.wrench,
-        "hand_rad": cycle.hand, "lost_replies": cycle.lost_replies, "cost_ticks": cycle.cost_ticks,
-    })
+    output.result(&FaultReport::of(&status, last.as_ref()), words)
 }
 
 fn text(status: &Status, last: Option<&LastSecond>) -> String {

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
-use super::{ErrorCode, Failure, Global, Table, connection};
+use super::{ErrorCode, Failure, Global, Table, connection, files};
 use crate::probe::{Line, ProbeError};
 use lab::image_file::{ImageFile, ImageFileError};
 use lab::simulation::built_image;
@@ -59,16 +60,48 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         (false, Some(())) => "written and verified; the device runs it; stored primitives were left alone",
     };
     let commands: Vec<String> = lines.iter().map(Line::to_string).collect();
-    output.result(
-        &json!({
-            "image": image.path, "firmware": image.description.firmware, "board": image.description.board,
-            "chip": chip, "bytes": image.bytes(), "link_version": image.description.link_version,
-            "schema_hash": format!("0x{:08x}", image.description.schema_hash),
-            "model_hash": format!("0x{:08x}", image.description.model_hash),
-            "commands": commands, "written": !command.dry_run, "confirmed": answers.is_some(),
-        }),
-        format!("{text}{ending}"),
-    )
+    let description = &image.description;
+    let data = Flashed {
+        image: files::text(&image.path),
+        firmware: description.firmware.clone(),
+        board: description.board.clone(),
+        chip: chip.to_owned(),
+        bytes: image.bytes(),
+        link_version: description.link_version,
+        schema_hash: format!("0x{:08x}", description.schema_hash),
+        model_hash: format!("0x{:08x}", description.model_hash),
+        commands,
+        written: !command.dry_run,
+        confirmed: answers.is_some(),
+    };
+    output.result(&data, format!("{text}{ending}"))
+}
+
+/// Data of `tactus --json flash`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Flashed {
+    /// The file.
+    pub image: String,
+    /// Version of the firmware in it.
+    pub firmware: String,
+    /// The board that it is for.
+    pub board: String,
+    /// The chip, as probe-rs calls it.
+    pub chip: String,
+    /// Size of the image.
+    pub bytes: u64,
+    /// Version of the link that it speaks.
+    pub link_version: u16,
+    /// Check sum of the messages.
+    pub schema_hash: String,
+    /// Check sum of the robot's model.
+    pub model_hash: String,
+    /// The command lines of the debug probe.
+    pub commands: Vec<String>,
+    /// They were run: the image is written and verified.
+    pub written: bool,
+    /// The running device says that it is this image; only with `--device`.
+    pub confirmed: bool,
 }
 
 /// The image a command is about: the one named, or the one built last.

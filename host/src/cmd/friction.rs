@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use schemars::JsonSchema;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::calibration_report::CalibrationReport;
@@ -70,13 +72,53 @@ fn table(joints: &[JointFriction; 7]) -> Table {
 }
 
 fn data(joints: &[JointFriction; 7]) -> Value {
-    let estimate = |estimate: Estimate| json!({ "value": estimate.value, "standard_error": estimate.error });
-    let joints = joints.iter().enumerate().map(|(joint, friction)| {
-        json!({
-            "coulomb_nm": estimate(friction.coulomb), "viscous_nms_per_rad": estimate(friction.viscous),
-            "left_rms_nm": friction.left, "speeds_rad_s": friction.speeds,
-            "model": { "coulomb_nm": FRICTION_COULOMB[joint], "viscous_nms_per_rad": FRICTION_VISCOUS[joint] },
-        })
+    let estimate = |Estimate { value, error }: Estimate| Estimated { value, standard_error: error };
+    let joints = joints.iter().enumerate().map(|(joint, friction)| JointData {
+        coulomb_nm: estimate(friction.coulomb),
+        viscous_nms_per_rad: estimate(friction.viscous),
+        left_rms_nm: friction.left,
+        speeds_rad_s: friction.speeds,
+        model: ModelData { coulomb_nm: FRICTION_COULOMB[joint], viscous_nms_per_rad: FRICTION_VISCOUS[joint] },
     });
-    json!({ "joints": joints.collect::<Vec<_>>() })
+    json!(Measured { joints: joints.collect() })
+}
+
+/// Data of `tactus --json calibrate friction`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Measured {
+    /// The joints, J1 first.
+    pub joints: Vec<JointData>,
+}
+
+/// Friction of a joint.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct JointData {
+    /// Friction that does not depend on the speed, N m.
+    pub coulomb_nm: Estimated,
+    /// Friction that grows with it, N m s/rad.
+    pub viscous_nms_per_rad: Estimated,
+    /// Residual of the line over the passes, N m RMS.
+    pub left_rms_nm: f64,
+    /// Slowest and fastest pass, rad/s.
+    pub speeds_rad_s: [f64; 2],
+    /// The same as the robot's model has it.
+    pub model: ModelData,
+}
+
+/// A number with its standard error.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Estimated {
+    /// The number.
+    pub value: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+}
+
+/// Friction of a joint by the robot's model.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ModelData {
+    /// Friction that does not depend on the speed, N m.
+    pub coulomb_nm: f64,
+    /// Friction that grows with it, N m s/rad.
+    pub viscous_nms_per_rad: f64,
 }

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use control::plan::load::LONGEST_MOVEMENT;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, files};
-use lab::demonstration::{DemonstrationError, Preparation, Recording};
+use lab::demonstration::{DemonstrationError, Preparation, Recording, RecordingError};
 use lab::learn::feedback::FeedbackOptions;
 use lab::learn::hand::HandMotion;
 use lab::learn::{self, LearnError, LearnOptions};
@@ -15,6 +16,9 @@ use lab::primitive_file::OrientationError;
 
 /// Usual cut-off of the filter, Hz.
 const CUTOFF: f64 = 7.5;
+
+/// An arm that went farther than this (m) in a recording without moving fast enough for a movement was led slowly.
+const SLOW_EXTENT: f64 = 0.02;
 
 /// Usual speed below which the arm counts as still, m/s.
 const STILL_SPEED: f64 = 0.005;
@@ -156,7 +160,18 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
         LearnError::Poor { .. } | LearnError::Fit { .. } if command.cutoff < CUTOFF => {
             Some(format!("a higher `--cutoff` ({CUTOFF} Hz is usual): the filter takes the movement away"))
         }
-        LearnError::Demonstration(DemonstrationError::Still { .. }) => Some(again("--no-trim")),
+        LearnError::Demonstration(DemonstrationError::Still { extent, .. }) if *extent > SLOW_EXTENT => {
+            Some(again("--no-trim"))
+        }
+        LearnError::Demonstration(DemonstrationError::Recording(RecordingError::NoRadians { .. })) => {
+            Some("convert the joint angles to radians".to_owned())
+        }
+        LearnError::Demonstration(DemonstrationError::Recording(RecordingError::NoSeconds { .. })) => {
+            Some("convert the times to seconds".to_owned())
+        }
+        LearnError::Demonstration(DemonstrationError::Duration { duration, .. }) => Some(
+            if *duration < LONGEST_MOVEMENT { "show it more slowly" } else { "show it faster, or in parts" }.to_owned(),
+        ),
         _ => None,
     };
     let code = match &error {

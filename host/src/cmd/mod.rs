@@ -17,9 +17,10 @@ pub mod export;
 pub mod faults;
 mod files;
 pub mod flash;
-mod friction;
+pub mod friction;
 pub mod get;
 pub mod hand;
+mod interruption;
 pub mod learn;
 pub mod list;
 pub mod logs;
@@ -44,16 +45,17 @@ pub mod statistics;
 pub mod status;
 pub mod stop;
 mod storage;
+pub mod tare;
 pub mod teach;
 pub mod upload;
-mod weigh;
+pub mod weigh;
 
 use std::io::{IsTerminal as _, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::{ArgAction, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+use clap::{ArgAction, ArgMatches, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 pub use output::Output;
 
@@ -63,7 +65,7 @@ use lab::failure::Failure;
 use lab::table::Table;
 use lab::transport::Address;
 
-use crate::config::{self as configuration, Config, Origin, Origins, seconds};
+use crate::config::{self as configuration, Config, Origin, Origins, TIMEOUT_VARIABLE, seconds};
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
 ///
@@ -71,7 +73,7 @@ use crate::config::{self as configuration, Config, Origin, Origins, seconds};
 /// 3 device not found, 4 incompatible versions, 5 device refused or faulted, 6 validation failed, 7 link lost,
 /// 130 interrupted after a confirmed stop.
 #[derive(Debug, Parser)]
-#[command(name = "tactus", version, propagate_version = true, disable_help_flag = true, after_help = examples::ALL)]
+#[command(name = "tactus", version, propagate_version = true, disable_help_flag = true, disable_version_flag = true, after_help = examples::ALL)]
 pub struct Cli {
     /// Options of every command.
     #[command(flatten)]
@@ -83,6 +85,7 @@ pub struct Cli {
 
 /// Options that every command has.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Options of every command")]
 pub struct Global {
     /// Write data as JSON: one object, or one a line for streams.
     #[arg(long, global = true)]
@@ -91,7 +94,7 @@ pub struct Global {
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// Never ask; what would be asked is refused.
-    #[arg(long, global = true)]
+    #[arg(long, global = true, hide_short_help = true)]
     pub non_interactive: bool,
     /// Replace files that exist.
     #[arg(long, global = true)]
@@ -102,11 +105,14 @@ pub struct Global {
     /// Show the help with every explanation.
     #[arg(long, global = true, action = ArgAction::HelpLong, hide_short_help = true)]
     pub help_all: Option<bool>,
+    /// Print the version.
+    #[arg(long, short = 'V', global = true, action = ArgAction::Version)]
+    pub version: Option<bool>,
     /// The device, such as `sil:` or `serial:PATH`; `tactus --help` lists them.
     #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
     pub device: Option<String>,
     /// Longest wait for an answer of the device, s.
-    #[arg(long, global = true, env = "TACTUS_TIMEOUT", default_value = "2", value_parser = seconds, value_name = "SECONDS")]
+    #[arg(long, global = true, env = TIMEOUT_VARIABLE, default_value = "2", value_parser = seconds, value_name = "SECONDS")]
     pub timeout: Duration,
     /// File with the secret of a device that keeps one (`tactus secret`).
     #[arg(long, global = true, env = "TACTUS_SECRET_FILE", value_name = "FILE", hide_short_help = true)]
@@ -121,6 +127,13 @@ impl Global {
     fn is_simulated_here(&self) -> bool {
         let address = self.device.as_deref().map(str::parse::<Address>);
         matches!(address, Some(Ok(Address::Simulated(..))))
+    }
+
+    /// True if the device is simulated in this process and keeps nothing in a file: what it stores ends with the
+    /// command.
+    fn forgets(&self) -> bool {
+        let address = self.device.as_deref().map(str::parse::<Address>);
+        matches!(address, Some(Ok(Address::Simulated(_, options))) if options.flash.is_none())
     }
 
     /// The address that the options name, if any.
@@ -190,9 +203,12 @@ pub enum Command {
     /// Show what the device says of itself and its arm
     #[command(after_help = examples::STATUS)]
     Status(status::Cmd),
-    /// Show or correct where the arm stands when it is zeroed
+    /// Show, measure or declare the home, weight, friction and payload of this arm
     #[command(after_help = examples::CALIBRATE)]
     Calibrate(calibrate::Cmd),
+    /// Take the present readings of force sensor and strain gauges as zero
+    #[command(after_help = examples::TARE)]
+    Tare(tare::Cmd),
     /// Initialise, open, close or move the hand
     #[command(after_help = examples::HAND)]
     Hand(hand::Cmd),
@@ -261,9 +277,7 @@ pub fn parse() -> Result<Cli, ExitCode> {
     let file = configuration::path();
     let config = file.as_deref().map_or(Ok(Config::default()), Config::read);
     let defaults = config.as_ref().ok().cloned().unwrap_or_default();
-    let mut command = defaults.defaults(Cli::command());
-    let matches = command.try_get_matches_from_mut(std::env::args_os()).map_err(|error| usage(&error))?;
-    let mut cli = Cli::from_arg_matches(&matches).map_err(|error| usage(&error.format(&mut command)))?;
+    let (mut cli, matches) = read(defaults.defaults(Cli::command()))?;
     cli.global.origins = defaults.origins(&matches, file);
     // What explains the error is not to fail with it.
     let needs_none = matches!(
@@ -274,24 +288,52 @@ pub fn parse() -> Result<Cli, ExitCode> {
             | Command::Completions(_)
             | Command::Manual(_)
     );
+    let Err(failure) = config else { return Ok(cli) };
     // An arm is not left moving because of a file that only saves typing.
-    let stops = matches!(cli.command, Command::Stop(_)) && cli.global.device.is_some();
-    match config {
-        Err(failure) if stops => {
+    if matches!(cli.command, Command::Stop(_)) {
+        let origins = &mut cli.global.origins;
+        if let (None, Some(file)) = (&cli.global.device, &origins.file) {
+            cli.global.device = Config::device_named(file);
+            origins.device = Origin::File;
+        }
+        if cli.global.device.is_some() {
             cli.global.output().warn(format!("{}: {}", failure.doing, failure.cause));
-            Ok(cli)
+            return Ok(cli);
         }
-        Err(failure) if !needs_none => Err(tell(&failure, cli.global.json)),
-        Err(failure) => {
-            cli.global.origins.problem = Some(format!("{}: {}", failure.doing, failure.cause));
-            Ok(cli)
-        }
-        _ => Ok(cli),
     }
+    if !needs_none {
+        return Err(tell(&failure, cli.global.json));
+    }
+    cli.global.origins.problem = Some(format!("{}: {}", failure.doing, failure.cause));
+    Ok(cli)
+}
+
+/// Reads the command line of this process. A time-out in the environment that is none does not prevent a stop.
+fn read(mut command: clap::Command) -> Result<(Cli, ArgMatches), ExitCode> {
+    let parsed = |command: &mut clap::Command| {
+        let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+        let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(command))?;
+        Ok::<_, clap::Error>((cli, matches))
+    };
+    // Parsing completes a command, so that what follows begins with another.
+    let another = command.clone();
+    let error = match parsed(&mut command) {
+        Ok(read) => return Ok(read),
+        Err(error) => error,
+    };
+    if let Some((problem, mut without)) = configuration::without_wrong_timeout(another)
+        && let Ok(read) = parsed(&mut without)
+        && matches!(read.0.command, Command::Stop(_))
+    {
+        read.0.global.output().warn(problem);
+        return Ok(read);
+    }
+    Err(usage(&error))
 }
 
 /// Runs what the command line asks for and reports failures; gives the exit code of the process.
 pub fn run(cli: Cli) -> ExitCode {
+    interruption::clear_away();
     let global = cli.global;
     let result = match cli.command {
         Command::Sim(command) => sim::run(&command, &global),
@@ -306,6 +348,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Status(command) => status::run(&command, &global),
         Command::Faults(command) => faults::run(&command, &global),
         Command::Calibrate(command) => calibrate::run(&command, &global),
+        Command::Tare(command) => tare::run(&command, &global),
         Command::Monitor(command) => monitor::run(&command, &global),
         Command::Record(command) => record::run(&command, &global),
         Command::Learn(command) => learn::run(&command, &global),

@@ -9,7 +9,7 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, KeyModifiers};
 
 use super::{ErrorCode, Failure, Global, Output, connection, teach, upload};
-use crate::monitor::{Watch, draw};
+use crate::monitor::{Streamed, Watch, draw};
 use lab::client::{Client, Incoming};
 use lab::device::Device;
 use lab::error::HostError;
@@ -114,7 +114,7 @@ fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, durat
                 watch.cycle(telemetry);
                 let is_due = line.is_none_or(|last| telemetry.cycle.wrapping_sub(last) >= LINE_EVERY);
                 if let (View::Lines(output), true) = (&mut *view, is_due) {
-                    if !output.line(&watch.to_json(), "").map_err(Ended::View)? {
+                    if !output.line(&Streamed::Line(Box::new(watch.line())), "").map_err(Ended::View)? {
                         return Ok(());
                     }
                     line = Some(telemetry.cycle);
@@ -123,7 +123,7 @@ fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, durat
             Some(Incoming::Event(event)) => {
                 let words = watch.event(&event).to_owned();
                 if let View::Lines(output) = view {
-                    let data = serde_json::json!({ "event": words, "cycle": event.cycle });
+                    let data = Streamed::Event { event: words, cycle: event.cycle };
                     if !output.line(&data, "").map_err(Ended::View)? {
                         return Ok(());
                     }

@@ -6,7 +6,8 @@ use clap::Args;
 use control::{Fault, State};
 use device::Stage;
 use link::{HandStage, HomeSource, Status};
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::storage::{self, Storage};
 use super::{Failure, Global, Table, connection, weigh};
@@ -57,19 +58,83 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let fault = Fault::from_code(status.fault).filter(|fault| *fault != Fault::None);
     let stage = Stage::from_code(status.startup_stage).map_or("unknown", Stage::explanation);
     let state = State::from_code(status.state).map_or("unknown", State::name);
-    global.output().result(
-        &json!({
-            "board": hello.board.as_str(), "firmware": hello.firmware.as_str(), "cycle": status.cycle,
-            "drives_arm": drives.arm, "drives_hand": drives.hand, "reads_wrench": drives.wrench,
-            "startup": stage, "blocked": status.blocked.map(explain_blocked),
-            "help": status.blocked.and_then(blocked_remedy), "state": state, "fault": status.fault,
-            "zeroed": status.zeroed, "home": source.map(HomeSource::name), "weight": weight,
-            "safety_mode": status.safety_mode,
-            "wrench_zeroed": status.wrench_zeroed, "hand": status.hand_stage.name(), "q_rad": status.q,
-            "storage": storage, "line": line, "hand_rad": status.hand, "loaded": status.loaded.as_ref().map(|name| name.as_str()),
-        }),
-        text(&status, &board, stage, state, fault, (source, weight.as_deref())) + &condition(storage.as_ref()) + &words(line.as_ref()),
-    )
+    let text = text(&status, &board, stage, state, fault, (source, weight.as_deref()))
+        + &condition(storage.as_ref())
+        + &words(line.as_ref());
+    let data = StatusReport {
+        board: hello.board.as_str().to_owned(),
+        firmware: hello.firmware.as_str().to_owned(),
+        cycle: status.cycle,
+        drives_arm: drives.arm,
+        drives_hand: drives.hand,
+        reads_wrench: drives.wrench,
+        startup: stage,
+        blocked: status.blocked.map(explain_blocked),
+        help: status.blocked.and_then(blocked_remedy),
+        state,
+        fault: status.fault,
+        zeroed: status.zeroed,
+        home: source.map(HomeSource::name),
+        weight,
+        safety_mode: status.safety_mode,
+        wrench_zeroed: status.wrench_zeroed,
+        hand: status.hand_stage.name(),
+        q_rad: status.q,
+        hand_rad: status.hand,
+        loaded: status.loaded.as_ref().map(|name| name.as_str().to_owned()),
+        storage,
+        line,
+    };
+    global.output().result(&data, text)
+}
+
+/// Data of `tactus --json status`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct StatusReport {
+    /// Name of the board.
+    pub board: String,
+    /// Version of its firmware.
+    pub firmware: String,
+    /// Control cycles since start-up.
+    pub cycle: u32,
+    /// The program of the device is made for an arm.
+    pub drives_arm: bool,
+    /// The same for a hand.
+    pub drives_hand: bool,
+    /// The same for a force/torque sensor.
+    pub reads_wrench: bool,
+    /// Stage of the start-up in words.
+    pub startup: &'static str,
+    /// Why the start-up cannot go on; null where it can.
+    pub blocked: Option<String>,
+    /// The remedy for that.
+    pub help: Option<&'static str>,
+    /// State of the supervisor.
+    pub state: &'static str,
+    /// Code of the latched fault, 0 for none.
+    pub fault: u8,
+    /// The encoders count from a known pose.
+    pub zeroed: bool,
+    /// Whose home counts; null where that is not known yet, and for a hand alone.
+    pub home: Option<&'static str>,
+    /// Whose weight the links are taken to have; likewise.
+    pub weight: Option<String>,
+    /// Mode of the safety module: 0 emergency stop, 1 idle, 2 active; null before it answered.
+    pub safety_mode: Option<u8>,
+    /// The wrench has a zero; null without a force/torque sensor.
+    pub wrench_zeroed: Option<bool>,
+    /// Stage of the hand's start-up.
+    pub hand: &'static str,
+    /// Joint angles J1 to J7, rad; they mean something where `zeroed` is true.
+    pub q_rad: [f32; 7],
+    /// Spread and fingers F1 to F3, rad; 0 unless the hand is ready.
+    pub hand_rad: [f32; 4],
+    /// The primitive in use.
+    pub loaded: Option<String>,
+    /// Losses of the storage; null while the device reads it.
+    pub storage: Option<Storage>,
+    /// Health of the line; null unless `--line` was given.
+    pub line: Option<LineHealth>,
 }
 
 fn text(

@@ -44,7 +44,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         UploadOutcome::Stored(listing) => (true, listing),
         UploadOutcome::AlreadyThere(listing) => (false, listing),
     };
-    if client.is_simulated() && client.transport().simulation().is_some() {
+    if global.forgets() {
         output.say("this simulated device ends with the command; one that stays: `tactus sim`");
     }
     let data = Uploaded {

@@ -6,6 +6,8 @@ use clap::Args;
 use control::Payload;
 use control::model::WeightCorrection;
 use link::{HomeSource, Weight};
+use schemars::JsonSchema;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::calibration_report::CalibrationReport;
@@ -117,13 +119,76 @@ fn table(weighing: &Weighing) -> Table {
 }
 
 fn data(weighing: &Weighing) -> Value {
-    let residual = |residual: &Residual| json!({ "rms_nm": residual.rms, "worst_nm": residual.worst });
-    let links = weighing.correction.links().map(|link| json!({ "share": link.share, "shift_m": link.shift }));
-    json!({
-        "fitted": { "before": residual(&weighing.fitted[0]), "after": residual(&weighing.fitted[1]) },
-        "held_out": { "before": residual(&weighing.held_out[0]), "after": residual(&weighing.held_out[1]) },
-        "friction_nm": weighing.friction, "determined": weighing.determined, "links": links,
+    let residual = |Residual { rms, worst }: Residual| Left { rms_nm: rms, worst_nm: worst };
+    let both = |[before, after]: [Residual; 2]| BeforeAfter { before: residual(before), after: residual(after) };
+    let links = weighing
+        .correction
+        .links()
+        .map(|link| LinkData { share: link.share.into(), shift_m: link.shift.map(f64::from) });
+    json!(Weighed {
+        fitted: both(weighing.fitted),
+        held_out: both(weighing.held_out),
+        friction_nm: weighing.friction,
+        determined: weighing.determined,
+        links,
     })
+}
+
+/// Data of `tactus --json calibrate gravity`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Weighed {
+    /// Torques that the weight does not explain, over the postures that it was found from.
+    pub fitted: BeforeAfter,
+    /// The same over postures that it was not found from.
+    pub held_out: BeforeAfter,
+    /// Friction of each joint at the speed of the passes, N m.
+    pub friction_nm: [f64; 7],
+    /// Combinations of the 28 numbers that the torques determined better than the model's.
+    pub determined: f64,
+    /// Corrections of the links, the one that J1 turns first.
+    pub links: [LinkData; 7],
+}
+
+/// Residuals with the weight before, and with the one that was found.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct BeforeAfter {
+    /// With the weight before.
+    pub before: Left,
+    /// With the weight that was found.
+    pub after: Left,
+}
+
+/// Residuals of each joint.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Left {
+    /// Root of the mean square, N m.
+    pub rms_nm: [f64; 7],
+    /// Largest, N m.
+    pub worst_nm: [f64; 7],
+}
+
+/// Correction of a link.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct LinkData {
+    /// Mass beyond the model's, as a share of it.
+    pub share: f64,
+    /// Shift of the first moment, as a share of the model's mass, m.
+    pub shift_m: [f64; 3],
+}
+
+/// Data of `tactus --json calibrate gravity --show` and `--reset`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct WeightShown {
+    /// Whose weight it is.
+    pub source: &'static str,
+    /// It is stored in the device.
+    pub stored: bool,
+    /// The device computes with it now.
+    pub in_use: bool,
+    /// It counts for an arm with sensor and hand.
+    pub with_hand: bool,
+    /// Corrections of the links, the one that J1 turns first.
+    pub links: [LinkData; 7],
 }
 
 /// The words for whose weight counts.
@@ -136,12 +201,17 @@ pub(super) fn weight_words(weight: &Weight) -> String {
     }
 }
 
-fn weight_data(weight: &Weight) -> Value {
-    let links = weight.links.map(|[share, x, y, z]| json!({ "share": share, "shift_m": [x, y, z] }));
-    json!({
-        "source": weight.source.name(), "stored": weight.source == HomeSource::Stored, "in_use": weight.in_use,
-        "with_hand": weight.hand, "links": links,
-    })
+fn weight_data(weight: &Weight) -> WeightShown {
+    WeightShown {
+        source: weight.source.name(),
+        stored: weight.source == HomeSource::Stored,
+        in_use: weight.in_use,
+        with_hand: weight.hand,
+        links: weight.links.map(|link| {
+            let [share, x, y, z] = link.map(f64::from);
+            LinkData { share, shift_m: [x, y, z] }
+        }),
+    }
 }
 
 fn weight_text(weight: &Weight) -> String {

@@ -1,5 +1,6 @@
 //! The state of a device that is watched: the newest of everything it told.
 
+mod line;
 mod screen;
 
 use std::collections::VecDeque;
@@ -12,8 +13,8 @@ use lab::error::explain_blocked;
 use lab::primitive_file::HostPrimitive;
 use lab::procedure::CHANNELS;
 use link::{DeviceHello, Event, EventKind, HandStage, Statistics, Status, Telemetry};
-use serde_json::{Value, json};
 
+pub use line::{Line, Streamed};
 pub use screen::draw;
 
 /// Events that are kept.
@@ -112,23 +113,37 @@ impl Watch {
     }
 
     /// All of it as one object; what is not known is null.
-    pub fn to_json(&self) -> Value {
+    pub fn line(&self) -> Line {
         let telemetry = self.telemetry.as_ref();
         let (now, worst) = self.computation_us();
         let hand = (self.status.hand_stage == HandStage::Ready).then_some(telemetry).flatten();
-        json!({
-            "state": self.state(), "fault": self.fault().map(|fault| format!("{fault:?}")), "cause": self.cause(),
-            "loaded": self.status.loaded.as_ref().map(|name| name.as_str()), "progress": self.progress(),
-            "cycle": telemetry.map(|t| t.cycle), "phase": telemetry.map(|t| t.phase),
-            "q_rad": telemetry.map(|t| t.q), "dq_rad_s": telemetry.map(|t| t.dq), "tau_Nm": telemetry.map(|t| t.tau),
-            "wrench_N_Nm": telemetry.map(|t| t.wrench), "expected_N_Nm": self.expected(),
-            "hand_rad": hand.map(|t| t.hand), "hand_d_rad": hand.map(|t| t.hand_d), "gauges_Nm": hand.map(|t| t.gauges),
-            "adaptation": self.adaptation(), "surprise": telemetry.map(|t| t.surprise),
-            "computation_us": telemetry.map(|_| now), "computation_worst_us": worst,
-            "missed_deadlines": self.statistics.missed_deadlines, "lost_replies": self.statistics.lost_replies,
-            "bus_errors": self.statistics.bus_errors, "bus_restarts": self.statistics.bus_restarts,
-            "telemetry_lost": self.gaps.telemetry, "telemetry_dropped": self.statistics.telemetry_dropped,
-        })
+        Line {
+            state: self.state(),
+            fault: self.fault().map(|fault| format!("{fault:?}")),
+            cause: self.cause(),
+            loaded: self.status.loaded.as_ref().map(|name| name.as_str().to_owned()),
+            progress: self.progress(),
+            cycle: telemetry.map(|cycle| cycle.cycle),
+            phase: telemetry.map(|cycle| cycle.phase),
+            q_rad: telemetry.map(|cycle| cycle.q),
+            dq_rad_s: telemetry.map(|cycle| cycle.dq),
+            tau_nm: telemetry.map(|cycle| cycle.tau),
+            wrench_n_nm: telemetry.map(|cycle| cycle.wrench),
+            expected_n_nm: self.expected(),
+            hand_rad: hand.map(|cycle| cycle.hand),
+            hand_d_rad: hand.map(|cycle| cycle.hand_d),
+            gauges_nm: hand.map(|cycle| cycle.gauges),
+            adaptation: self.adaptation(),
+            surprise: telemetry.map(|cycle| cycle.surprise),
+            computation_us: telemetry.map(|_| now),
+            computation_worst_us: worst,
+            missed_deadlines: self.statistics.missed_deadlines,
+            lost_replies: self.statistics.lost_replies,
+            bus_errors: self.statistics.bus_errors,
+            bus_restarts: self.statistics.bus_restarts,
+            telemetry_lost: self.gaps.telemetry,
+            telemetry_dropped: self.statistics.telemetry_dropped,
+        }
     }
 }
 

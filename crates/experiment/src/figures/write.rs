@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::series::Expected;
 use super::{bars, forces, paths, series, strip, success_map};
-use crate::lift::{Carried, Case};
+use crate::carried::Carried;
+use crate::lift::Case;
 use crate::outcome::Measures;
 use crate::runner::{Experiment, representative};
 use crate::trace::CHANNELS;

@@ -50,6 +50,14 @@ impl<T: Transport> Client<T> {
         self.order(&Request::Approach { q, duration })
     }
 
+    /// Takes the present wrench and the present gauges as zero.
+    ///
+    /// # Errors
+    /// As [`Client::request`]; refused in a run, and where no wrench is measured.
+    pub fn tare(&mut self) -> Result<(), HostError> {
+        self.order(&Request::Tare)
+    }
+
     /// Initialises the hand: the fingers drive to their stops, for about five seconds. Accepted before that time is
     /// over; the status tells the rest.
     ///

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use control::plan::load::{LONGEST_MOVEMENT, SHORTEST_MOVEMENT};
 use thiserror::Error;
 
 /// A place in a recording: file, line and column, all as a person counts them (from 1).
@@ -136,7 +137,7 @@ pub enum RecordingError {
         value: f64,
     },
     /// Time does not increase from one line to the next.
-    #[error("{place}: time runs backwards: {time} s after {before} s")]
+    #[error("{place}: time does not go on: {time} s after {before} s")]
     TimeRunsBackwards {
         /// Where.
         place: Place,
@@ -174,6 +175,14 @@ pub enum RecordingError {
         gap: f64,
         /// The longest gap that is bridged, s.
         longest: f64,
+    },
+    /// Samples so far apart that the times are in another unit.
+    #[error("{place}: the samples are {step:.1} s apart: are these milliseconds? Seconds are expected")]
+    NoSeconds {
+        /// Where.
+        place: Place,
+        /// Mean time from one to the next, s.
+        step: f64,
     },
     /// A joint angle of several turns.
     #[error("{place}: no joint turns as far as {angle:.1} rad: are these degrees? Radians are expected")]
@@ -230,5 +239,18 @@ pub enum DemonstrationError {
         needed: f64,
         /// Speed below which the arm counts as still, m/s.
         threshold: f64,
+        /// Extent of all that was recorded, m.
+        extent: f64,
+    },
+    /// The movement is over too soon or too late.
+    #[error(
+        "{file}: the movement takes {duration:.3} s, an arm plays {SHORTEST_MOVEMENT} to {LONGEST_MOVEMENT} s",
+        file = file.display()
+    )]
+    Duration {
+        /// The file.
+        file: PathBuf,
+        /// Time that it takes, with what is kept before and behind it, s.
+        duration: f64,
     },
 }

@@ -7,8 +7,13 @@ use super::error::RecordingError;
 use super::recording::Recording;
 use super::{angle_between, layout};
 
-/// Bound of a value from one line to the next: this far at once, and this fast. An arm that is led by hand goes a tenth
-/// of it; encoders, times and numbers of few digits stay below the first part.
+/// Bound of a value from one line to the next: this far at once, and this fast. Encoders, times and numbers of few
+/// digits stay below the first part.
+///
+/// Measured as the largest share of the bound that a recording uses. The example demonstration and four movements
+/// of the simulated teacher, at 50 and 300 Hz: 4 % of a joint's, 1 % of the position's. Three recordings of an arm that
+/// a person led, 1800 lines each at 300 Hz: 1 % of the position's, 4 % of the turn's. At 300 Hz nothing shorter than
+/// 0.13 rad, 67 mm or 0.27 rad in one line is a leap: what is smaller is fitted as a movement.
 #[derive(Clone, Copy)]
 struct Bound {
     at_once: f64,
@@ -72,4 +77,25 @@ fn check(recording: &Recording, index: usize, name: &str, leap: f64, bound: Boun
             "correct the value, or show the movement again"
         },
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn the_example_demonstration_uses_a_twentieth_of_the_bound_of_a_leap() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/reach.csv");
+        let recording = Recording::read(&file).unwrap();
+        let q = recording.q.as_ref().unwrap();
+        let share = |index: usize| {
+            let seconds = recording.time[index] - recording.time[index - 1];
+            let farthest = (0..7).map(|joint| (q[index][joint] - q[index - 1][joint]).abs()).fold(0.0, f64::max);
+            farthest / (JOINT.at_once + JOINT.per_second * seconds)
+        };
+        let largest = (1..recording.len()).map(share).fold(0.0, f64::max);
+        assert!((0.03..0.05).contains(&largest), "{largest}");
+    }
 }

@@ -23,6 +23,10 @@ use crate::arm;
 /// Rate at which a primitive is learned and played, Hz. Another value would change what 7.5 Hz means to the filter.
 pub const RATE: f64 = control::RATE;
 
+/// Samples further apart than this (s) in the mean are of a clock that counts milliseconds: 300 Hz are 3.3 of them, and
+/// nothing that records an arm is slower than once in a second.
+const LONGEST_STEP: f64 = 1.0;
+
 /// Longest gap that is bridged by a straight line, s. A hand can change direction within a tenth of a second; what
 /// happened in a longer gap is not known.
 pub const LONGEST_GAP: f64 = 0.1;
@@ -142,6 +146,11 @@ impl Demonstration {
         let (gap, behind) = recording.longest_gap;
         // Times of few digits: a tenth of a second of a recording at 10 Hz is not more than one.
         if gap > LONGEST_GAP + TIME_ROUNDING {
+            let steps = recording.len().saturating_sub(1).max(1) as f64;
+            let step = (recording.time[recording.len() - 1] - recording.time[0]) / steps;
+            if step > LONGEST_STEP {
+                return Err(RecordingError::NoSeconds { place: recording.place(behind, layout::TIME), step }.into());
+            }
             return Err(RecordingError::GapTooLong {
                 place: recording.place(behind, layout::TIME),
                 gap,
@@ -209,6 +218,7 @@ impl Demonstration {
                 moving: (last - first) as f64 / RATE,
                 needed: FEWEST_SAMPLES as f64 / RATE,
                 threshold,
+                extent: self.extent(),
             });
         }
         let (first, last) = (first.saturating_sub(REST), (last + REST).min(end));

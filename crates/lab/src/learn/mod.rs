@@ -15,6 +15,7 @@ pub mod report;
 use std::path::{Path, PathBuf};
 
 use control::plan::bounds::{DISPLACEMENT, GAIN};
+use control::plan::load::{LONGEST_MOVEMENT, SHORTEST_MOVEMENT};
 use control::plan::primitive::Reference;
 use dmp::fit::{LARGEST_ANGLE, LARGEST_ROTATION_VECTOR, WARNING_ANGLE};
 use thiserror::Error;
@@ -177,8 +178,7 @@ const WORST_REPRODUCTION: (f64, f64) = (0.03, 10.0 * std::f64::consts::PI / 180.
 pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Result<Learned, LearnError> {
     check_options(options)?;
     let mut demonstration = Demonstration::prepare(recording, &options.preparation)?;
-    let moving_end = demonstration.speed().last().is_some_and(|speed| *speed > MOVING_END);
-    if options.dwell > 0.0 && moving_end {
+    if options.dwell > 0.0 && demonstration.speed().last().is_some_and(|speed| *speed > MOVING_END) {
         return Err(LearnError::Option {
             option: "--dwell",
             reason: "the demonstration ends in motion, and nothing can rest behind that".to_owned(),
@@ -194,6 +194,7 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
     let largest_angle = check_angle(recording, &demonstration, options, &mut warnings)?;
     demonstration.hasten(options.speed);
     demonstration.rest(options.dwell);
+    check_duration(recording, demonstration.duration())?;
     let posture = match &demonstration.q {
         Some(q) => q.clone(),
         None => {
@@ -204,14 +205,7 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
             vec![DEFAULT_POSTURE; demonstration.len()]
         }
     };
-    let speed = demonstration.speed();
-    for (end, speed) in [("begins", speed.first()), ("ends", speed.last())] {
-        if let Some(speed) = speed.filter(|speed| **speed > MOVING_END) {
-            warnings.push(format!(
-                "the demonstration {end} in motion, at {speed:.3} m/s: a run starts and ends at rest, hold the arm still for half a second before and after"
-            ));
-        }
-    }
+    warnings.extend(moving_ends(&demonstration.speed()));
     if demonstration.pose_source == PoseSource::JointAngles && recording.position.is_some() {
         check_pose_columns(recording, &mut warnings);
     }
@@ -267,6 +261,25 @@ fn slow_ends(demonstration: &Demonstration) -> impl Iterator<Item = String> {
             )
         },
     )
+}
+
+/// Refuses what the control code would not play.
+fn check_duration(recording: &Recording, duration: f64) -> Result<(), DemonstrationError> {
+    if (SHORTEST_MOVEMENT..=LONGEST_MOVEMENT).contains(&duration) {
+        return Ok(());
+    }
+    Err(DemonstrationError::Duration { file: recording.file.clone(), duration })
+}
+
+/// Warnings of a movement that begins or ends with one of these speeds (m/s), and not at rest.
+fn moving_ends(speed: &[f64]) -> impl Iterator<Item = String> {
+    let ends = [("begins", speed.first()), ("ends", speed.last())];
+    ends.into_iter().filter_map(|(end, speed)| {
+        let speed = speed.filter(|speed| **speed > MOVING_END)?;
+        Some(format!(
+            "the demonstration {end} in motion, at {speed:.3} m/s: a run starts and ends at rest, hold the arm still for half a second before and after"
+        ))
+    })
 }
 
 /// Refuses values that are out of range.

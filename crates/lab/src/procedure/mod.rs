@@ -7,7 +7,9 @@ mod mode;
 mod ready;
 mod recorder;
 mod rehearse;
+mod rest;
 mod run;
+mod tare;
 mod teach;
 mod travel;
 mod wait;
@@ -20,6 +22,7 @@ pub use ready::{Readiness, StartupLook, make_ready, start_up};
 pub use recorder::{CycleWriter, Recorder, Take, recording_row, recording_text};
 pub use rehearse::play_once;
 pub use run::{CHANNELS, Change, ChangeKind, FlagCounts, RunOutcome, RunRequest, Surprise, planned, play};
+pub use tare::{Reading, Tared, tare};
 pub use teach::{Demonstrated, record_demonstration, teacher};
 pub use travel::{go_to_start, travel};
 pub use wait::{EndCondition, after, pass, wait_for};
@@ -51,6 +54,12 @@ pub enum ProcedureError {
     Moves {
         /// The first joint that does, 0 for J1.
         joint: usize,
+    },
+    /// Something loads the hand whose weight is to count as nothing.
+    #[error("{force:.1} N act on the hand at rest, more than a sensor drifts")]
+    Loaded {
+        /// The force, N.
+        force: f64,
     },
     /// A fault is latched.
     #[error("fault: {0:?}: {0}")]

@@ -70,6 +70,9 @@ pub enum SimulationError {
     /// The file for the log of the buses cannot be written.
     #[error("the log of the buses: {0}")]
     BusLog(#[from] OutputError),
+    /// The file for the report of the emulated board cannot be written.
+    #[error("the report of the emulated board: {0}")]
+    BoardReport(#[source] OutputError),
     /// The file that is the device's flash cannot be used.
     #[error("cannot use {0} as the device's flash: {1}")]
     Flash(PathBuf, #[source] io::Error),

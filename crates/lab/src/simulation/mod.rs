@@ -40,6 +40,7 @@ use fault_script::FaultScript;
 use in_process::InProcess;
 use qemu::Qemu;
 
+use crate::output_file;
 use crate::transport::{Transport, TransportError};
 
 /// Something that executes the co-controller's application and lets virtual time pass.
@@ -65,6 +66,10 @@ impl Simulation {
     /// The world or the engine named in `options` cannot be started here; the message names the command that sets it
     /// up.
     pub fn start(options: &SimulationOptions) -> Result<Self, SimulationError> {
+        if let Some(report) = &options.board_report {
+            output_file::refuse(report, options.replace_logs, &options.inputs())
+                .map_err(SimulationError::BoardReport)?;
+        }
         let world = options.build_world()?;
         let mut plant = Plant::new(PlantConfig { seed: options.seed, ..options.plant.clone() }, world);
         if let Some(name) = &options.faults {

@@ -4,8 +4,8 @@ use std::io::{BufWriter, ErrorKind, Write};
 use std::path::PathBuf;
 
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
-use serde_json::json;
 
 use super::source::Source;
 use super::{ErrorCode, Failure, Global, Output, connection};
@@ -35,15 +35,46 @@ pub struct Cmd {
 /// Times of a log beyond this one are those of a computer's clock, us: 2001 and later.
 const SINCE_1970: u64 = 1_000_000_000_000_000;
 
-/// One line as data.
-#[derive(Serialize)]
-struct Data<'a> {
-    time_s: f64,
-    interface: &'a str,
-    id: String,
-    data: String,
+/// A line of `tactus --json can decode`.
+#[derive(Debug, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Decoded<'a> {
+    /// A frame.
+    Frame(Data<'a>),
+    /// The last line.
+    Summary {
+        /// All that was read.
+        summary: Sum<'a>,
+    },
+}
+
+/// One frame as data.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Data<'a> {
+    /// Time since the first frame; in a log of a simulation, since power-up, s.
+    pub time_s: f64,
+    /// The interface.
+    pub interface: &'a str,
+    /// Identifier, hexadecimal.
+    pub id: String,
+    /// The bytes, hexadecimal.
+    pub data: String,
+    /// The meaning.
     #[serde(flatten)]
-    meaning: &'a Meaning,
+    pub meaning: &'a Meaning,
+}
+
+/// The summary as data.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Sum<'a> {
+    /// By interface, the arm's first.
+    pub interfaces: &'a [Summary],
+    /// Lines that are not in candump's format.
+    pub unreadable_lines: u64,
+    /// Segments of the host's link that are missing.
+    pub link_segment_gaps: u32,
+    /// Messages of the link that were damaged.
+    pub link_damaged_messages: u32,
 }
 
 /// Reads a log or a bus.
@@ -111,7 +142,7 @@ impl Printer {
         let time = line.time_us.saturating_sub(first) as f64 * 1e-6;
         let (id, data) = (line.frame.id_text(), line.frame.data_text());
         let text = if self.output.json {
-            let data = Data { time_s: time, interface: &line.interface, id, data, meaning };
+            let data = Decoded::Frame(Data { time_s: time, interface: &line.interface, id, data, meaning });
             serde_json::to_string(&data).map_err(|cause| broken(cause.into()))?
         } else {
             let parties = format!("{} > {}", meaning.from, meaning.to);
@@ -124,11 +155,14 @@ impl Printer {
         if self.output.json {
             let gaps: u32 = damage.iter().map(|(gaps, _)| gaps).sum();
             let bad: u32 = damage.iter().map(|(_, bad)| bad).sum();
-            let data = json!({ "summary": {
-                "interfaces": summaries, "unreadable_lines": garbage,
-                "link_segment_gaps": gaps, "link_damaged_messages": bad,
-            } });
-            self.write(&data.to_string())?;
+            let summary = Sum {
+                interfaces: summaries,
+                unreadable_lines: garbage,
+                link_segment_gaps: gaps,
+                link_damaged_messages: bad,
+            };
+            let text = serde_json::to_string(&Decoded::Summary { summary }).map_err(|cause| broken(cause.into()))?;
+            self.write(&text)?;
         } else {
             for (place, (summary, (gaps, bad))) in summaries.iter().zip(damage).enumerate() {
                 let before = if self.lines || place > 0 { "\n" } else { "" };

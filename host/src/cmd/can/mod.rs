@@ -1,6 +1,6 @@
 //! `tactus can`: the arm's bus as a log or live, and logs played to the device's application.
 
-mod decode;
+pub mod decode;
 mod replay;
 mod source;
 

@@ -10,7 +10,8 @@ use clap::{Args, ValueEnum};
 use control::model::WeightCorrection;
 use device::Stage;
 use link::{HomeSource, Weight};
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global};
 use lab::client::Client;
@@ -117,12 +118,23 @@ fn show(client: &mut Client<Device>, global: &Global) -> Result<(), Failure> {
     let (declared, blocked) = (declared(&kept), status.blocked.map(explain_blocked));
     let weight = if is_measured(&kept) { "measured" } else { "the model's" };
     let blocked_words = blocked.as_ref().map(|reason| format!("\nstart-up: {reason}")).unwrap_or_default();
-    global.output().result(
-        &json!({ "declared": declared.name(), "answers": answers, "weight": weight, "blocked": blocked }),
-        format!(
-            "declared: {}\nanswers: {}\nweight: {weight}{blocked_words}",
-            declared.name(),
-            answers.unwrap_or("not known before the pucks were asked")
-        ),
-    )
+    let text = format!(
+        "declared: {}\nanswers: {}\nweight: {weight}{blocked_words}",
+        declared.name(),
+        answers.unwrap_or("not known before the pucks were asked")
+    );
+    global.output().result(&PayloadShown { declared: declared.name(), answers, weight, blocked }, text)
+}
+
+/// Data of `tactus --json calibrate payload` without `--measure`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct PayloadShown {
+    /// The declared payload: hand, nothing or undeclared.
+    pub declared: &'static str,
+    /// `sensor` or `no sensor`, by who answers on the arm's bus; null before the pucks were asked.
+    pub answers: Option<&'static str>,
+    /// Whose weight the links are taken to have.
+    pub weight: &'static str,
+    /// Why the start-up cannot go on; null where it can.
+    pub blocked: Option<String>,
 }

@@ -1,0 +1,165 @@
+//! A newcomer's first hour: words that mislead, files that are left lying about, and logs that end too early.
+#![cfg(unix)]
+
+#[path = "../../crates/lab/tests/common/mod.rs"]
+mod common;
+
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+fn command(folder: &Path, line: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE");
+    command.args(line.split_whitespace()).stdin(Stdio::null());
+    command
+}
+
+fn tactus(folder: &Path, line: &str) -> Output {
+    command(folder, line).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The program under a shell that lets no file grow: it stands for a full disk.
+fn without_room(folder: &Path, line: &str) -> Output {
+    let mut command = Command::new("sh");
+    command.args(["-c", &format!("ulimit -f 0; exec \"$0\" {line}"), env!("CARGO_BIN_EXE_tactus")]);
+    command.current_dir(folder).env_remove("TACTUS_DEVICE").stdin(Stdio::null()).output().unwrap()
+}
+
+#[test]
+fn a_primitive_that_a_file_keeps_is_not_said_to_be_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    common::demonstration(folder, 2.0);
+    assert!(tactus(folder, "learn demo.csv -o reach.toml").status.success());
+    let lost = "this simulated device ends with the command";
+    let kept = tactus(folder, "--device sil:world=simple,flash=arm.flash upload reach.toml");
+    assert!(kept.status.success() && !said(&kept).contains(lost), "{}", said(&kept));
+    let forgotten = tactus(folder, "--device sil:world=simple upload reach.toml");
+    assert!(forgotten.status.success() && said(&forgotten).contains(lost), "{}", said(&forgotten));
+}
+
+#[test]
+fn a_log_of_the_buses_without_its_last_lines_is_no_success() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = without_room(folder.path(), "--device sil:world=simple,bus=bus.log list");
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("E235") && said(&output).contains("bus.log"), "{}", said(&output));
+}
+
+/// Names of unfinished files in a folder.
+fn parts(folder: &Path) -> Vec<String> {
+    let names = folder.read_dir().unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    names.filter(|name| name.ends_with(".part")).collect()
+}
+
+/// Sends a signal by the system's own program.
+fn signal(child: &Child, signal: &str) {
+    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+}
+
+#[test]
+fn a_drawing_that_is_interrupted_leaves_nothing_unfinished() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    common::demonstration(folder, 60.0);
+    let deadline = Instant::now() + Duration::from_secs(60);
+    for name in ["-INT", "-TERM", "-HUP"] {
+        // A drawing may be faster than this test: another try then.
+        loop {
+            assert!(Instant::now() < deadline, "no drawing was caught unfinished");
+            let mut child = command(folder, "plot --force -d demo.csv -o a.svg -o b.png")
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn()
+                .unwrap();
+            while parts(folder).is_empty() && child.try_wait().unwrap().is_none() {
+                std::thread::sleep(Duration::from_micros(200));
+            }
+            if child.try_wait().unwrap().is_none() {
+                signal(&child, name);
+            }
+            let ended = child.wait().unwrap();
+            assert_eq!(parts(folder), Vec::<String>::new(), "{name}");
+            if ended.code().is_none() {
+                break;
+            }
+        }
+    }
+}
+
+const HEAD: &str = "t_s,q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,q7_rad\n";
+
+/// A movement that takes so many seconds at 50 Hz, with its times and its angles in other units.
+fn recording(folder: &Path, name: &str, duration: f64, [time_unit, angle_unit]: [f64; 2]) {
+    let lines = (duration * 50.0).max(90.0) as u32;
+    let line = |line: u32| {
+        let part = f64::from(line) / f64::from(lines);
+        let angles = common::posture(part).map(|angle| format!("{:.6}", angle * angle_unit));
+        format!("{},{}\n", part * duration * time_unit, angles.join(","))
+    };
+    std::fs::write(folder.join(name), HEAD.to_owned() + &(0..=lines).map(line).collect::<String>()).unwrap();
+}
+
+#[test]
+fn a_recording_in_other_units_is_told_so_with_the_way_to_mend_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    recording(folder, "right.csv", 3.0, [1.0, 1.0]);
+    recording(folder, "degrees.csv", 3.0, [1.0, f64::to_degrees(1.0)]);
+    recording(folder, "milliseconds.csv", 3.0, [1000.0, 1.0]);
+    assert!(tactus(folder, "learn right.csv").status.success());
+    for (name, question, help) in [
+        ("degrees.csv", "are these degrees?", "help: convert the joint angles to radians"),
+        ("milliseconds.csv", "are these milliseconds?", "help: convert the times to seconds"),
+    ] {
+        let refused = tactus(folder, &format!("learn {name}"));
+        assert_eq!(refused.status.code(), Some(6), "{}", said(&refused));
+        assert!(said(&refused).contains(question) && said(&refused).contains(help), "{}", said(&refused));
+    }
+}
+
+#[test]
+fn a_movement_that_no_arm_would_play_is_not_learned() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (name, duration) in [("short.csv", 0.45), ("long.csv", 130.0)] {
+        recording(folder, name, duration, [1.0, 1.0]);
+        let refused = tactus(folder, &format!("learn --no-trim {name} -o a.toml"));
+        assert_eq!(refused.status.code(), Some(6), "{name}: {}", said(&refused));
+        assert!(said(&refused).contains("an arm plays 0.5 to 120 s"), "{}", said(&refused));
+        assert!(!folder.join("a.toml").exists());
+    }
+}
+
+#[test]
+fn a_recording_of_an_arm_that_stands_is_not_said_to_be_learnable() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let lines = (0..200).map(|line| format!("{},0,0.5,0,1.5,0,0,0\n", f64::from(line) * 0.02));
+    std::fs::write(folder.join("still.csv"), HEAD.to_owned() + &lines.collect::<String>()).unwrap();
+    let refused = tactus(folder, "learn still.csv");
+    assert_eq!(refused.status.code(), Some(6), "{}", said(&refused));
+    assert!(
+        !said(&refused).contains("--no-trim") && said(&refused).contains("show the movement"),
+        "{}",
+        said(&refused)
+    );
+}
+
+#[test]
+fn a_socket_at_which_nobody_serves_is_no_cable() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    drop(std::os::unix::net::UnixListener::bind(folder.join("dead.sock")).unwrap());
+    for socket in ["dead.sock", "none.sock"] {
+        let refused = tactus(folder, &format!("--device unix:{socket} list"));
+        assert_eq!(refused.status.code(), Some(3), "{}", said(&refused));
+        let help = format!("`tactus sim --listen unix:{socket}`");
+        assert!(said(&refused).contains(&help) && !said(&refused).contains("cable"), "{}", said(&refused));
+    }
+}
