@@ -140,8 +140,8 @@ fn a_run_that_was_stopped_is_run_again_from_a_hold_and_comes_to_its_plan_as_well
     }
 }
 
-/// Fastest speed of the hand (m/s) and farthest way of the joint beyond where it was (rad), once somebody who has led it
-/// aside by `torque` (N m) for four seconds, without touching what a sensor feels, lets go of it.
+/// Fastest speed of the hand (m/s) and farthest way of the joint beyond where it was (rad), once somebody lets go of it
+/// who has led it aside by `torque` (N m) for four seconds, where no sensor is.
 fn let_go_of(friction: f64, (joint, torque): (usize, f64), has_integral: bool) -> (f64, f64) {
     let mut rig = rig(friction, nominal());
     if !has_integral {
@@ -171,8 +171,8 @@ fn let_go_of(friction: f64, (joint, torque): (usize, f64), has_integral: bool) -
     (fastest, beyond)
 }
 
-/// What nobody feels winds the integral up, to its bound and no farther: the arm is drawn past its plan by what that
-/// bends its spring, no faster than the spring alone lets it go.
+/// The integral is wound up by an unseen push, to its bound and no farther: the arm is drawn past its plan by what that
+/// bends its spring, and hardly faster than the spring alone draws it.
 ///
 /// The change that makes it fail: a bound of three times the friction.
 #[test]
