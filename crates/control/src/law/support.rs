@@ -17,8 +17,8 @@ const MOST: f64 = 12.0;
 /// Speed of the hand up to which nothing changes (m/s): in a stop a load comes to rest with so little.
 const SLACK: f64 = 0.01;
 
-/// Growth of the force (N/s) for each m/s that the hand sinks faster, and its decline where it rises. With 70 a kilogram
-/// sank at 0.4 m/s after 0.3 s, with 200 at 0.17. A decline that is much faster drives the cables.
+/// Growth of the force (N/s) for each m/s that the hand sinks faster, and its decline where it rises. With 70 a
+/// kilogram sank at 0.4 m/s after 0.3 s, with 200 at 0.17. A decline that is much faster drives the cables.
 const TAKING: f64 = 200.0;
 
 /// Decline of a force that the hand does not bear (N/s): all of it in 0.04 s. The inertia of what hangs on the hand
