@@ -62,7 +62,7 @@ cargo xtask <verb>
   mutants  wrong changes of the code that named tests must catch; cargo xtask mutants WORDS: those whose name has WORDS
   faults [--all] [--json] [ID...]   the fault catalogue: every script of tests/faults against the simulated arm
            --device sim: | board: the scenarios marked for it, with the image under QEMU or on the emulated board
-  faults storm [--runs N] [--seed S]   random faults and orders; one run prints itself as a scenario
+  faults storm [--wide] [--runs N] [--seed S]   random faults and orders; one run prints itself as a scenario
   faults endurance [--hours H] [--seed S]   such storms on one arm in one process, H hours of simulated time, 0.25 unless given
   fuzz [COUNT]   COUNT random link frames and as many CAN frames, a tenth of it random sessions; 1000000 unless given
   margins  every control law on an arm without friction, kicked: what is left, worst pose, frequency

@@ -71,6 +71,10 @@ pub struct Scenario {
     /// The way back, and whether zeroing must be demanded on it.
     #[serde(default)]
     pub recover: Recover,
+    /// Faults on the way back, whose times count from its beginning. It may fail by them; once they are over it is gone
+    /// again, and has to lead to its end.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub late: Vec<Injection>,
 }
 
 impl Scenario {
@@ -166,6 +170,18 @@ pub enum Given {
     Speed(f64),
     /// The host says nothing for so many seconds.
     Silence(f64),
+    /// Approach the end of the movement.
+    Approach,
+    /// The movement, in the mode of the scenario.
+    Run,
+    /// Spread and fingers F1 to F3 go there, rad.
+    Hand([f64; 4]),
+    /// Initialise the hand.
+    InitialiseHand,
+    /// Take the present wrench for zero.
+    Tare,
+    /// The movement is uploaded.
+    Upload,
 }
 
 /// Answers of the device.

@@ -1,5 +1,5 @@
 //! `faults [--json] [--all] [--device sim:|board:] [ID...]`: runs the fault catalogue, or some of it.
-//! `faults storm [--runs N] [--seed S]`: runs storms of random faults, the seeds in a row from S on.
+//! `faults storm [--wide] [--runs N] [--seed S]`: runs storms of random faults, the seeds in a row from S on.
 //! `faults endurance [--hours H] [--seed S]`: the same on one arm in one process, for hours of simulated time.
 
 use std::path::Path;
@@ -38,16 +38,18 @@ fn main() -> ExitCode {
 /// Runs storms; one that fails, or that is alone, is told with its seed and as a scenario.
 fn storms(words: &[String]) -> Result<bool, Box<dyn std::error::Error>> {
     let (mut runs, mut first) = (300_u64, 1_u64);
+    let wide = words.iter().any(|word| word == "--wide");
+    let words: Vec<&String> = words.iter().filter(|word| *word != "--wide").collect();
     for pair in words.chunks(2) {
         match pair {
-            [flag, number] if flag == "--runs" => runs = number.parse()?,
-            [flag, number] if flag == "--seed" => first = number.parse()?,
-            _ => return Err(format!("unknown: {}", pair.join(" ")).into()),
+            [flag, number] if *flag == "--runs" => runs = number.parse()?,
+            [flag, number] if *flag == "--seed" => first = number.parse()?,
+            _ => return Err(format!("unknown: {pair:?}").into()),
         }
     }
     let seeds: Vec<u64> = (first..first.saturating_add(runs)).collect();
     let mut outcomes = on_every_processor(&seeds, |seed| {
-        let outcome = storm::run(*seed);
+        let outcome = storm::run(*seed, wide);
         if runs == 1 || !outcome.verdict.holds() {
             print!("{}", report::storm(&outcome, runs == 1));
         }
@@ -58,7 +60,11 @@ fn storms(words: &[String]) -> Result<bool, Box<dyn std::error::Error>> {
         outcomes.iter().filter(|outcome| !outcome.verdict.holds()).map(|outcome| outcome.seed).collect();
     eprintln!("{}", report::storms(&outcomes));
     if !failed.is_empty() {
-        eprintln!("failed: {failed:?}; again: cargo xtask faults storm --runs 1 --seed {}", failed[0]);
+        eprintln!(
+            "failed: {failed:?}; again: cargo xtask faults storm{} --runs 1 --seed {}",
+            if wide { " --wide" } else { "" },
+            failed[0]
+        );
     }
     Ok(failed.is_empty())
 }

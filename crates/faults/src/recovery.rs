@@ -11,7 +11,7 @@ use puck::SafetyMode;
 use sim::PendantAction;
 
 use crate::bench::{Arm, Failure, plant};
-use crate::entry::Recover;
+use crate::entry::{Recover, Scenario};
 use crate::measure::AT_REST;
 use crate::movement::movement;
 
@@ -65,6 +65,24 @@ pub fn recover(arm: &mut Arm, way: Recover) -> Result<(), Failure> {
     procedure::go_to_start(arm, &movement.start, |_| {}).map_err(|error| format!("to the start: {error}"))?;
     let request = RunRequest::new(Name::new(&movement.name)?, movement.movement.duration, Mode::Track.options());
     procedure::play(arm, &request, &mut |_| {}).map_err(|error| format!("run: {error}"))?;
+    Ok(())
+}
+
+/// Goes the way back while the late faults of a scenario befall the arm, and waits until they are over. What fails by
+/// them is told to nobody.
+///
+/// # Errors
+/// The device does not answer any more.
+pub fn hindered(arm: &mut Arm, scenario: &Scenario) -> Result<(), Failure> {
+    let begin = arm.now();
+    plant(arm).inject(&scenario.late);
+    let _ = recover(arm, scenario.recover);
+    let ends =
+        scenario.late.iter().map(|fault| if fault.lasts.is_finite() { fault.at + fault.lasts } else { fault.at });
+    let end = begin + Duration::from_secs_f64(ends.fold(0.0, f64::max)) + NOTICE;
+    while arm.now() < end {
+        arm.next(NOTICE)?;
+    }
     Ok(())
 }
 

@@ -163,6 +163,9 @@ pub fn judged(
 /// The way back, and the bars of every scenario on it.
 fn recovered(arm: &mut bench::Arm, scenario: &Scenario, verdict: &mut Verdict) -> Result<(), Failure> {
     bench::plant(arm).take_recorded();
+    if !scenario.late.is_empty() {
+        recovery::hindered(arm, scenario)?;
+    }
     let outcome = recovery::recover(arm, scenario.recover);
     let sent = crate::bus::sent(&bench::plant(arm).take_recorded());
     for (figure, value) in

@@ -15,6 +15,12 @@ use crate::run::{self, Verdict};
 /// Stream of noise that draws storms.
 const STREAM: u64 = 0x5702;
 
+/// The same for what a wide one has more.
+const WIDE_STREAM: u64 = 0x5703;
+
+/// Faults on the way back begin within this time, s.
+const ON_THE_WAY: f64 = 15.0;
+
 /// Faults and orders begin within this time, s.
 const BEGIN: f64 = 2.5;
 
@@ -29,10 +35,10 @@ pub struct Outcome {
     pub verdict: Verdict,
 }
 
-/// The storm of this seed, run.
+/// The storm of this seed, run; a `wide` one has more orders, and faults on the way back.
 #[must_use]
-pub fn run(seed: u64) -> Outcome {
-    let scenario = draw(seed);
+pub fn run(seed: u64, wide: bool) -> Outcome {
+    let scenario = if wide { draw_wide(seed) } else { draw(seed) };
     let entry = Entry {
         id: "storm".to_owned(),
         title: String::new(),
@@ -78,7 +84,25 @@ pub fn draw(seed: u64) -> Scenario {
         order,
         expect,
         recover: Recover::ZeroIfAsked,
+        late: Vec::new(),
     }
+}
+
+/// The storm of this seed, with one to three orders more, of every kind, and one or two faults on the way back.
+#[must_use]
+pub fn draw_wide(seed: u64) -> Scenario {
+    let mut scenario = draw(seed);
+    let mut dice = Dice(Noise::new(seed, WIDE_STREAM));
+    for _ in 0..1 + dice.below(3) {
+        let at = dice.between(0.02, BEGIN);
+        scenario.order.push(Order { at, give: dice.any_order(), answer: None });
+    }
+    for _ in 0..1 + dice.below(2) {
+        let at = dice.scale(0.02, ON_THE_WAY);
+        scenario.late.push(dice.injection(at));
+    }
+    scenario.name = format!("wide storm {seed}");
+    scenario
 }
 
 /// Bars other than those of every scenario. What a device is told wrong with a right check sum, or not told at all, it
@@ -153,6 +177,18 @@ impl Dice {
                 let size = self.between(0.0, 0.3);
                 Given::Goal(self.direction().map(|axis| size * axis))
             }
+        }
+    }
+
+    fn any_order(&mut self) -> Given {
+        match self.below(8) {
+            0 => Given::Approach,
+            1 => Given::Run,
+            2 => Given::Hand([0.0, 1.0, 1.0, 1.0].map(|share| share * self.between(0.0, 2.0))),
+            3 => Given::InitialiseHand,
+            4 => Given::Tare,
+            5 => Given::Upload,
+            _ => self.order(),
         }
     }
 

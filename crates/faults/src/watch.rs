@@ -8,13 +8,13 @@ use lab::error::HostError;
 use lab::simulation::CYCLE_TICKS;
 use lab::transport::Transport as _;
 use link::frame::Decoder;
-use link::{EventKind, Goal, HostHello, LINK_VERSION, Reply, Request, SCHEMA_HASH, Statistics, Telemetry, Text};
+use link::{EventKind, Goal, HostHello, LINK_VERSION, Name, Reply, Request, SCHEMA_HASH, Statistics, Telemetry, Text};
 use puck::SafetyMode;
 use sim::{Passage, Ticks};
 
 use crate::bench::{Arm, Failure, plant};
 use crate::entry::{Answer, From, Given, Scenario};
-use crate::movement::GOAL;
+use crate::movement::{GOAL, movement};
 
 /// Telemetry missing for so long makes the runner ask for the state.
 const SILENT: f64 = 0.05;
@@ -94,7 +94,7 @@ pub fn watch(arm: &mut Arm, scenario: &Scenario, with_faults: bool) -> Result<Wa
     while observer.time(arm) < scenario.watch {
         let now = observer.time(arm);
         if let Some(order) = orders.pop_if(|order| order.at <= now) {
-            let answer = observer.give(arm, order.give)?;
+            let answer = observer.give(arm, order.give, scenario)?;
             let arms = matches!(order.give, Given::Hold | Given::Gravity) && observer.fault == Fault::SafetyDropped;
             if (order.give == Given::Clear || arms) && answer.is_ok() {
                 clears.push(now);
@@ -150,7 +150,7 @@ impl Observer {
     }
 
     /// Gives an order; the refusal, if it is refused.
-    fn give(&mut self, arm: &mut Arm, order: Given) -> Result<Result<(), HostError>, Failure> {
+    fn give(&mut self, arm: &mut Arm, order: Given, scenario: &Scenario) -> Result<Result<(), HostError>, Failure> {
         let answer = match order {
             Given::Stop => arm.stop(),
             Given::Clear => arm.clear_fault(),
@@ -164,6 +164,12 @@ impl Observer {
                 arm.set_goal(Goal { position: Some(position), orientation: None })
             }
             Given::Silence(seconds) => return self.be_silent(arm, seconds).map(Ok),
+            Given::Approach => arm.approach(GOAL.map(|angle| angle as f32), 0.0),
+            Given::Run => arm.run(&Name::new(&movement().name)?, scenario.mode.options()),
+            Given::Hand(q) => arm.move_hand(q.map(|angle| angle as f32), 0.0),
+            Given::InitialiseHand => arm.initialise_hand(),
+            Given::Tare => arm.request(&Request::Tare).map(|_| ()),
+            Given::Upload => arm.upload(&movement().to_image()?, |_, _, _| {}).map(|_| ()),
         };
         match answer {
             Err(error) if !matches!(error, HostError::Refused { .. } | HostError::NotStopped { .. }) => {

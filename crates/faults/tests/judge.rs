@@ -113,3 +113,21 @@ fn torque_frames_without_a_partner_are_measured() {
     let ends = [frames[0], frames[1], frame(2, Group::ARM_TORQUES, 0), frame(3, Group::ARM_TORQUES, 0)];
     assert!(bus::largest_step(&bus::sent(&ends)) < 0.1);
 }
+
+/// An E-STOP costs the zero, which is asked for on the second way back and nowhere else.
+#[test]
+fn faults_on_the_way_back_befall_the_arm_and_the_way_is_gone_once_more() {
+    let verdict = |recover: &str, late: &str| {
+        let text = format!("from = \"hold\"\nwatch = 0.1\nrecover = \"{recover}\"\nlate = [{late}]");
+        let entry = Entry::parse(
+            Path::new("tests/faults/a1.toml"),
+            &format!("title = \"t\"\nbar = \"b\"\ntoday = \"part\"\n\n[[scenario]]\nname = \"s\"\n{text}\n"),
+        );
+        let entry = entry.expect("sound");
+        faults::run::run(&entry, &entry.scenario[0], SimulatorKind::InProcess)
+    };
+    let pressed = "{ at = 30.0, what.pendant = \"press-estop\" }";
+    assert_eq!(verdict("zero", pressed).failures, [""; 0]);
+    assert_eq!(verdict("run", "").failures, [""; 0]);
+    assert!(!verdict("run", pressed).holds() && !verdict("zero", "").holds());
+}

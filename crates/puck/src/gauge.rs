@@ -73,5 +73,8 @@ mod tests {
             assert!(torque(f64::from(reading)) < torque(f64::from(reading + 1)));
         }
         assert_eq!(torque(f64::NAN), -2.85);
+        for (beyond, end) in [(4096.0, 4095.0), (1e9, 4095.0), (-1.0, 0.0), (f64::NEG_INFINITY, 0.0)] {
+            assert_eq!(torque(beyond), torque(end), "{beyond}");
+        }
     }
 }

@@ -9,6 +9,7 @@ use crate::law::integral::PostureIntegral;
 use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
 use crate::law::settling::Settling;
+use crate::law::support::Support;
 use crate::model::friction;
 use crate::plan::approach::Approach;
 use crate::plan::reference::JointReference;
@@ -43,8 +44,8 @@ pub(super) enum Law<R: Real> {
     Posture(Posture<R>),
     /// `Run`.
     Run(Running<R>),
-    /// `SoftStop`: the torque beyond gravity when it began is ramped away.
-    SoftStop(Ramp<R>),
+    /// `SoftStop`: the torque beyond gravity when it began is ramped away, and what sinks nevertheless is carried.
+    SoftStop(Ramp<R>, Support<R>),
     /// `Lower`: as `SoftStop`, and gravity is taken away as the arm sinks.
     Lower(Lowering<R>),
 }
@@ -246,7 +247,7 @@ impl<R: Real> Ramp<R> {
 }
 
 /// Speed of the hand at which the arm sinks (m/s): half of the 0.25 m/s of the standards for work beside a person.
-const SINKING_SPEED: f64 = 0.12;
+pub(super) const SINKING_SPEED: f64 = 0.12;
 
 /// Change of the share of gravity for each m/s that the hand is faster than that (1/s).
 const SINKING_GAIN: f64 = 6.0;
@@ -266,6 +267,8 @@ pub(super) struct Lowering<R: Real> {
     pub(super) rest: Ramp<R>,
     /// Share of gravity that is carried.
     pub(super) share: R,
+    /// Carries a load that nobody declared.
+    pub(super) support: Support<R>,
     /// Control periods for which it has rested without torque, and those left.
     rested: u16,
     left: u16,
@@ -274,7 +277,7 @@ pub(super) struct Lowering<R: Real> {
 impl<R: Real> Lowering<R> {
     /// Begins with all of gravity.
     pub(super) fn new(rest: Ramp<R>) -> Self {
-        Lowering { rest, share: R::constant(1.0), rested: 0, left: LOWERING }
+        Lowering { rest, share: R::constant(1.0), support: Support::new(), rested: 0, left: LOWERING }
     }
 
     /// Takes the speed of the hand (m/s) and of the fastest joint (rad/s).

@@ -1,7 +1,7 @@
 //! The laws of the states: from what is measured to the torque that is wanted. What a law remembers, its ramp for one,
 //! is in `law.rs`; the length of a ramp is a constant of `mod.rs`.
 
-use crate::cycle::law::{Lag, Law, Running};
+use crate::cycle::law::{Lag, Law, Running, SINKING_SPEED};
 use crate::cycle::record::{Event, flags};
 use crate::cycle::{Cycle, Measured, WRENCH_AGE};
 use crate::guard::monitor::{TIP_REACH, TIP_SPEED_LIMIT, TRACKING_LIMIT};
@@ -58,7 +58,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Law::Gravity => self.float(measured),
             Law::Posture(_) => self.hold_to(measured),
             Law::Run(_) => self.run_primitive(measured),
-            Law::SoftStop(_) | Law::Lower(_) => self.stop(measured),
+            Law::SoftStop(..) | Law::Lower(_) => self.stop(measured),
         };
         if let Some(JointTorques(push)) = pushed {
             // An arm that is lowered comes down to its stops, not to what pushes back before them.
@@ -123,18 +123,28 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// Not inlined, as [`Cycle::hold_to`].
     #[inline(never)]
     fn stop(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
-        let (rest, share) = match &mut self.law {
-            Law::SoftStop(ramp) => (ramp.step(), R::constant(1.0)),
+        let twist = measured.frames.jacobian().twist(&measured.state.dq.0);
+        // What is not measured does not sink.
+        let sinking = if measured.state.missing == 0 { -twist[2] } else { R::constant(0.0) };
+        let borne = if self.senses(measured) == Senses::Lost { R::constant(0.0) } else { -measured.wrench.force.z };
+        let (rest, share, support) = match &mut self.law {
+            Law::SoftStop(ramp, support) => {
+                support.step(sinking, borne, R::constant(0.0));
+                (ramp.step(), R::constant(1.0), support)
+            }
             Law::Lower(lowering) => {
-                lowering.step(hand_speed(measured), measured.state.dq.0.amax());
-                (lowering.rest.step(), lowering.share)
+                let hand = sqrt(twist.fixed_rows::<3>(0).norm_squared());
+                lowering.step(hand, measured.state.dq.0.amax());
+                lowering.support.step(sinking, borne, R::constant(SINKING_SPEED));
+                (lowering.rest.step(), lowering.share, &mut lowering.support)
             }
             _ => return self.float(measured),
         };
+        let load = support.torque(measured.frames);
         let gravity = self.steady_gravity(measured);
         let velocity = self.observer.velocity(measured.state, Trust::Stiff);
         let damping = self.gains.stop_damping.component_mul(&velocity);
-        let demand = self.plain(measured, gravity * share + rest - damping);
+        let demand = self.plain(measured, gravity * share + rest + load - damping);
         Demand { explained: (gravity, Vector7::zeros()), ..demand }
     }
 

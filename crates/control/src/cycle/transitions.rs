@@ -11,6 +11,7 @@ use crate::law::force::ForceController;
 use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
 use crate::law::settling::Settling;
+use crate::law::support::Support;
 use crate::plan::approach::Approach;
 use crate::plan::primitive::Primitive;
 use crate::real::{Real, within};
@@ -47,7 +48,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             // Without a measurement there is nothing to hold or to stop with: only states without torque can follow, or
             // a soft stop whose ramp has nothing to take away.
             if state.has_torque() {
-                self.law = Law::SoftStop(Ramp::none());
+                self.law = Law::SoftStop(Ramp::none(), Support::new());
             } else {
                 self.leave_torque();
             }
@@ -61,11 +62,19 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         match (state, &mut self.law) {
             (State::Hold, Law::Posture(posture)) => posture.follow(None, &self.calibration.transmission),
             (State::Hold, Law::Run(_)) => self.law = Law::Posture(self.after_run(measured)),
+            (State::Hold, Law::SoftStop(_, support)) => {
+                let load = support.torque(measured.frames);
+                self.law = Law::Posture(self.posture_under(&load, measured));
+            }
             (State::Hold, _) => self.law = Law::Posture(Posture::at(measured.state.q)),
             (State::SoftStop | State::Lower, _) => {
                 let gravity = self.model.gravity_torque(measured.frames);
                 let rest = Ramp::new(self.limiter.last().torques().0 - gravity.0, STOP_RAMP);
-                self.law = if state == State::Lower { Law::Lower(Lowering::new(rest)) } else { Law::SoftStop(rest) };
+                self.law = if state == State::Lower {
+                    Law::Lower(Lowering::new(rest))
+                } else {
+                    Law::SoftStop(rest, Support::new())
+                };
             }
             _ => self.law = Law::Gravity,
         }
@@ -130,7 +139,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Law::Run(Running { controller, .. }) => *controller.friction(),
             _ => Vector7::zeros(),
         };
-        let torque = self.beyond + friction + stiff.damping.component_mul(&velocity);
+        self.posture_under(&(self.beyond + friction + stiff.damping.component_mul(&velocity)), measured)
+    }
+
+    /// The present posture, held with this torque (N m) from the beginning.
+    fn posture_under(&self, torque: &Vector7<R>, measured: &Measured<'_, R>) -> Posture<R> {
+        let stiff = &self.gains.stiff;
         let offset = torque.component_div(&stiff.stiffness).zip_map(&stiff.clamp, within);
         let mut posture = Posture::at(measured.state.q);
         let held = posture.integral.take_over(&self.gains, &offset, &measured.state.q);

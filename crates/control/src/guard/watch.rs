@@ -233,6 +233,11 @@ fn magnitude<R: Real>(value: R) -> R {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::vec;
+    use std::vec::Vec;
+
     use super::*;
 
     fn statistics() -> SensorStatistics<f64> {
@@ -346,11 +351,82 @@ mod tests {
         }
     }
 
+    /// Statistics that expect nothing on any channel, each with this spread.
+    fn still(spread: [f64; STATISTICS_CHANNELS]) -> SensorStatistics<f64> {
+        SensorStatistics::new(&[[0.0; STATISTICS_CHANNELS]; 2], &[spread; 2], 10).expect("valid statistics")
+    }
+
+    /// Each channel that is told within a second of these values.
+    fn told(values: &[f64; STATISTICS_CHANNELS], has_hand: bool) -> Vec<u8> {
+        let (statistics, mut watch) = (still([0.1; STATISTICS_CHANNELS]), Watch::new());
+        let surprises = (0..crate::time::periods(1.0)).filter_map(|_| watch.step(&statistics, 1.5, values, has_hand));
+        surprises.map(|surprise| surprise.channel).collect()
+    }
+
     #[test]
-    fn without_a_hand_its_channels_say_nothing() {
-        let (statistics, mut watch) = (statistics(), Watch::new());
-        for _ in 0..300 {
-            assert_eq!(watch.step(&statistics, 1.0, &values(0.0, 0.0), false), None);
+    fn every_channel_that_leaves_its_band_is_told_and_without_a_hand_those_of_the_wrist_alone() {
+        for channel in 0..STATISTICS_CHANNELS {
+            // Spreads by a factor of ten; a wild one that lasts is no corrupt sample.
+            for value in [1.0, 100.0, -1.0, -100.0] {
+                let mut values = [0.0; STATISTICS_CHANNELS];
+                values[channel] = value;
+                let expected = if channel < FIRST_FINGER || value > 0.0 { vec![channel as u8] } else { vec![] };
+                assert_eq!(told(&values, true), expected, "{value}");
+                assert_eq!(told(&values, false), if channel < WRIST_CHANNELS { expected } else { vec![] }, "{value}");
+            }
         }
+    }
+
+    #[test]
+    fn of_channels_that_leave_their_bands_together_the_most_deviant_is_told() {
+        for (first, second, most) in [(2.0, 1.9, 1), (1.9, 2.0, 4)] {
+            let mut values = [0.0; STATISTICS_CHANNELS];
+            (values[1], values[4]) = (first, -second);
+            assert_eq!(told(&values, true), [most]);
+        }
+    }
+
+    #[test]
+    fn the_statistic_is_the_largest_size_in_limits_and_a_finger_that_closes_less_has_none() {
+        let (statistics, mut watch) = (still([0.1; STATISTICS_CHANNELS]), Watch::new());
+        let mut values = [0.0; STATISTICS_CHANNELS];
+        (values[2], values[7], values[9], values[10]) = (-0.3, 0.2, -0.8, 0.1);
+        for _ in 0..crate::time::periods(2.0) {
+            watch.step(&statistics, 0.5, &values, true);
+        }
+        let mut expected = [0.0; STATISTICS_CHANNELS];
+        (expected[2], expected[7], expected[10]) = (3.0, 2.0, 1.0);
+        assert!(watch.sizes().iter().zip(expected).all(|(size, expected)| (size - expected).abs() < 1e-6));
+        assert!((watch.statistic() - 3.0 / LIMIT).abs() < 1e-6, "{}", watch.statistic());
+    }
+
+    /// Statistic of a run that is pushed with `force` (N) for ten seconds, and then by nothing for five.
+    fn released(force: [f64; 3], progress: f64, has_hand: bool) -> f64 {
+        let (statistics, mut watch) = (still([1e3; STATISTICS_CHANNELS]), Watch::new());
+        for tick in 0..crate::time::periods(15.0) {
+            let mut values = [0.0; STATISTICS_CHANNELS];
+            if tick < crate::time::periods(10.0) {
+                values[..3].copy_from_slice(&force);
+            }
+            watch.step(&statistics, progress, &values, has_hand);
+        }
+        watch.statistic()
+    }
+
+    #[test]
+    fn a_newton_in_any_direction_is_a_contact_that_can_be_lost_also_without_a_hand() {
+        for axis in 0..3 {
+            for (newtons, lost) in [(1.1, LOST), (-1.1, LOST), (0.9, 0.0)] {
+                let mut force = [0.0; 3];
+                force[axis] = newtons;
+                assert!((released(force, 0.5, axis == 0) - lost).abs() < 0.01, "{force:?}");
+            }
+        }
+        assert_eq!(released([0.7, 0.7, 0.3], 1.0, true), LOST);
+    }
+
+    #[test]
+    fn contact_that_ends_after_the_movement_is_not_lost() {
+        assert!(released([5.0, 0.0, 0.0], 1.001, true) < 0.01);
     }
 }

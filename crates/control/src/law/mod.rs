@@ -9,6 +9,7 @@ pub mod integral;
 pub mod joint;
 pub mod operational;
 pub mod settling;
+pub mod support;
 pub mod window;
 
 pub use force::ForceController;
@@ -18,4 +19,5 @@ pub use integral::PostureIntegral;
 pub use joint::JointController;
 pub use operational::OperationalController;
 pub use settling::Settling;
+pub use support::Support;
 pub use window::Window;

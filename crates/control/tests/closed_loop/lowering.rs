@@ -252,3 +252,82 @@ fn g2_counts_that_jump_while_no_torque_is_on_cost_the_zero_with_the_reason() {
     assert_eq!(told, Some(Event::Entered(State::Idle, Fault::ImplausiblePosition)));
     assert_eq!(rig.tick(Some(Command::Hold)).event, Some(Event::Refused(Refusal::ZeroLost)));
 }
+
+/// A load on the hand that nobody declared (N).
+const UNDECLARED: f64 = 9.81;
+
+/// An arm that comes to carry [`UNDECLARED`] in this posture and is given this order in the same cycle.
+fn loaded_and_ordered(posture: [f64; 7], friction: f64, order: Command) -> Rig<f32> {
+    let mut rig = Rig::<f32>::new(posture, 1);
+    rig.plant.coulomb *= friction;
+    rig.plant.viscous *= friction;
+    rig.command(Command::Hold);
+    rig.run_for(1.0);
+    rig.plant.push[2] = -UNDECLARED;
+    rig.command(order);
+    rig
+}
+
+/// The change that makes it fail: nothing carries the load ([`control::law::Support`]). Up to 0.98 m/s then.
+#[test]
+fn e7_a_load_that_nobody_declared_sinks_slowly_after_a_stop() {
+    for (posture, friction) in [(OUT, 1.0), (OUT, 0.0), (START, 1.0), (START, 0.3), (GOAL, 1.0), (GOAL, 0.0)] {
+        let mut rig = loaded_and_ordered(posture, friction, Command::Stop);
+        let first = fastest(&mut rig, 0.3);
+        let (early, late) = (fastest(&mut rig, 1.0), (fastest(&mut rig, 3.0), fastest(&mut rig, 0.1)).1);
+        println!("{posture:?}, friction {friction}: {first:.2}, then {early:.2}, {late:.3} m/s");
+        assert!(early < SLOW && late < 0.05, "{early} m/s, then {late}");
+        assert_eq!(rig.cycle.state(), State::SoftStop);
+        // It stands, so that somebody can have it held, and does not drop as that begins.
+        rig.command(Command::Hold);
+        assert!(fastest(&mut rig, 1.0) < SLOW);
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));
+    }
+}
+
+/// The change that makes it fail: nothing carries the load. Up to 0.98 m/s then.
+#[test]
+fn g7_a_released_arm_sinks_slowly_under_a_load_that_nobody_declared() {
+    for (posture, friction) in [(OUT, 1.0), (OUT, 0.0), (START, 1.0), (START, 0.3), (GOAL, 1.0), (GOAL, 0.0)] {
+        let mut rig = loaded_and_ordered(posture, friction, Command::Release);
+        let first = fastest(&mut rig, 0.3);
+        let mut after = 0.0f64;
+        while rig.cycle.state() == State::Lower {
+            rig.tick(None);
+            after = after.max(hand_speed(&rig));
+        }
+        println!("{posture:?}, friction {friction}: {first:.2}, then {after:.2} m/s");
+        assert!(after < SLOW, "{after} m/s");
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Idle, Fault::None));
+    }
+}
+
+/// It springs back from its stops at 0.26 m/s at most, as if nothing had been taken for a load, and by 0.07 m.
+///
+/// The change that makes it fail: the force is not bounded by what the hand is measured to bear.
+#[test]
+fn g1_a_stopped_arm_that_somebody_pressed_down_does_not_spring_up_when_it_is_let_go_of() {
+    for friction in [0.0, 0.3, 1.0] {
+        for (newtons, seconds) in [(20.0, 3.0), (40.0, 1.0), (80.0, 0.3)] {
+            let mut rig = Rig::<f32>::new(START, 1);
+            rig.plant.coulomb *= friction;
+            rig.plant.viscous *= friction;
+            rig.command(Command::Hold);
+            rig.run_for(1.0);
+            rig.command(Command::Stop);
+            rig.run_for(0.3);
+            rig.plant.push[2] = -newtons;
+            rig.run_for(seconds);
+            rig.plant.push[2] = 0.0;
+            let low = rig.plant.frames().tool_pose().position.z;
+            let (mut up, mut rise) = (0.0f64, 0.0f64);
+            for _ in 0..periods(3.0) {
+                rig.tick(None);
+                up = up.max(rig.plant.frames().jacobian().twist(&rig.plant.dq)[2]);
+                rise = rise.max(rig.plant.frames().tool_pose().position.z - low);
+            }
+            println!("friction {friction}, {newtons} N for {seconds} s: up at {up:.3} m/s, by {rise:.3} m");
+            assert!(up < 0.28 && rise < 0.08, "{up} m/s, {rise} m");
+        }
+    }
+}

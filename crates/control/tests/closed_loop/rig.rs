@@ -32,6 +32,8 @@ pub(crate) struct Plant {
     pub(crate) viscous: Vector7<f64>,
     /// World-frame force and torque of the environment on the tool.
     pub(crate) push: [f64; 6],
+    /// Torque of what touches the arm where no sensor is, its elbow for one (N m, joint by joint).
+    pub(crate) unseen: Vector7<f64>,
     /// A compliant plane: position of its surface on the x axis (m) and stiffness (N/m).
     pub(crate) wall: Option<(f64, f64)>,
     pub(crate) torque: Vector7<f64>,
@@ -60,6 +62,7 @@ impl Plant {
             coulomb: Vector7::from(model::FRICTION_COULOMB),
             viscous: Vector7::from(model::FRICTION_VISCOUS),
             push: [0.0; 6],
+            unseen: Vector7::zeros(),
             wall: None,
             torque: Vector7::zeros(),
             hand_weight: model::HAND_MASS * 9.81,
@@ -154,7 +157,7 @@ impl Plant {
             let bias =
                 self.model.coriolis_torque(&frames, &JointVelocities(self.dq)).0 + self.model.gravity_torque(&frames).0;
             let environment = nalgebra::Vector6::from(self.environment());
-            let external = frames.jacobian().transpose_times(&environment);
+            let external = frames.jacobian().transpose_times(&environment) + self.unseen;
             let damped = mass + SMatrix::<f64, 7, 7>::from_diagonal(&(self.viscous * dt));
             let inverse = damped.try_inverse().expect("a mass matrix");
             let stops = self.stops(&mass, dt);

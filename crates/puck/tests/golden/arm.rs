@@ -141,3 +141,26 @@ fn a9_both_ends_of_the_counter_are_exact() {
     assert_eq!(Counts(-HALF).unwrapped_near(Counts(HALF - 1)), Counts(HALF));
     assert_eq!(Counts(HALF - 1).unwrapped_near(Counts(-HALF)), Counts(-HALF - 1));
 }
+
+/// The manual lists gears and differentials; the configuration of 2018 lists their products, rounded.
+#[test]
+fn the_gears_of_the_manual_are_the_coefficients_of_the_configuration() {
+    let ratios = Ratios::from_gears([42.0, 28.25, 28.25, 18.0, 9.7, 9.7, 14.93], 1.68, 1.0);
+    for (found, expected) in ratios.coefficients.iter().zip(Ratios::WAM7.coefficients) {
+        assert!((found - expected).abs() < 5e-5, "{found} {expected}");
+    }
+    let ratios = Ratios::from_gears([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], 0.5, 0.25);
+    assert_eq!(ratios.coefficients, [1.0, 2.0, 6.0, 4.0, 5.0, 1.5, 7.0]);
+}
+
+#[test]
+fn an_arm_without_a_transmission_is_told_which_motor_is_wrong() {
+    for (error, words) in [
+        (TransmissionError::Ratio, "gear ratio is not a positive number"),
+        (TransmissionError::CountsPerRevolution { motor: 0 }, "motor 1 reports a CTS that is not positive"),
+        (TransmissionError::UnitsPerNewtonMetre { motor: 6 }, "motor 7 reports an IPNM that is not positive"),
+    ] {
+        assert_eq!(error.to_string(), words);
+    }
+    assert_eq!(NotFinite.to_string(), "value is NaN or infinite");
+}

@@ -329,3 +329,25 @@ fn a_negative_limit_is_refused_whatever_it_is_multiplied_with() {
     assert_eq!(torque_limits(&table, -3.0, -4.0, 1000), Err(LimitError::NotPositive));
     assert!(torque_limits(&table, 3.0, 0.0, 1000).is_ok() && torque_limits(&table, 3.0, -0.0, 1000).is_ok());
 }
+
+/// A device that reads what it should not acts on it: a question with the bit of an order, or the other way round.
+#[test]
+fn a_request_whose_first_byte_contradicts_its_length_is_refused_with_words() {
+    let read = |to: Destination, bytes: &[u8]| {
+        let id = puck::CanId::encode(Node::HOST, to);
+        Request::decode(&puck::CanFrame::from_slice(id, bytes).expect("a frame"))
+    };
+    let group = Destination::from(puck::Group::ARM_TORQUES);
+    let node = Destination::from(puck::Node::new(3).expect("a node"));
+    assert!(read(node, &[0x05]).is_ok() && read(group, &[0xAA, 0, 0, 0, 0, 0, 0, 0]).is_ok());
+    for (to, bytes, error, words) in [
+        (node, &[0x85][..], puck::RequestError::Header, "malformed header"),
+        (group, &[0x2A, 0, 0, 0, 0, 0, 0, 0], puck::RequestError::Header, "malformed header"),
+        (node, &[0xAA, 0, 0, 0, 0, 0, 0, 0], puck::RequestError::PackedToNode, "packed torques to a single node"),
+        (node, &[], puck::RequestError::Length, "no request has this length"),
+    ] {
+        let refused = read(to, bytes);
+        assert_eq!(refused, Err(error), "{bytes:02x?}");
+        assert_eq!(error.to_string(), words);
+    }
+}
