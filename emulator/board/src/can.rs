@@ -54,6 +54,9 @@ pub struct Can {
     frames_sent: u64,
 }
 
+/// Where the registers of the controllers begin.
+const REGISTERS: [u64; 2] = [0x4000_A000, 0x4000_A400];
+
 /// Offset of SIDFC.
 const STANDARD_FILTERS: u32 = 0x84;
 
@@ -165,6 +168,27 @@ impl Can {
     pub fn starve(&mut self, unit: Unit, handler: Handler, now: u64) {
         self.controllers.starve(unit, handler, now);
         self.settle(now);
+    }
+
+    /// The receive queue of a controller lets nothing go any more.
+    pub fn stick_receive(&mut self, unit: Unit, now: u64) {
+        self.controllers.stick_receive(unit, now);
+        self.settle(now);
+    }
+
+    /// A bit of a controller's register or of the message memory falls over. `false`: nothing of them is there.
+    pub fn flip(&mut self, address: u32, bit: u32, now: u64) -> bool {
+        let address = u64::from(address);
+        let memory = MESSAGE_MEMORY..MESSAGE_MEMORY + MESSAGE_MEMORY_BYTES;
+        if memory.contains(&address) {
+            self.controllers.flip_memory((address - MESSAGE_MEMORY) as u32, bit, now);
+        } else if let Some(unit) = Unit::BOTH.into_iter().find(|unit| address & !0xFF == REGISTERS[*unit as usize]) {
+            self.controllers.flip(unit, address as u32 & 0xFF, bit, now);
+        } else {
+            return false;
+        }
+        self.settle(now);
+        true
     }
 
     /// Where bus-off sets INIT of a controller, it is read so many nanoseconds later.
