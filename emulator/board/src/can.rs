@@ -52,6 +52,8 @@ pub struct Can {
     /// Frames offered to the arm's bus, and those whose end it has told.
     frames_offered: u64,
     frames_sent: u64,
+    /// The first line of the arm's controller is up for good.
+    line_held: bool,
 }
 
 /// Where the registers of the controllers begin.
@@ -97,6 +99,7 @@ impl SharedCan {
             remarks: Vec::new(),
             frames_offered: 0,
             frames_sent: 0,
+            line_held: false,
         })))
     }
 
@@ -170,6 +173,11 @@ impl Can {
         self.settle(now);
     }
 
+    /// The first interrupt line of the arm's controller stays up whatever its flags are, until a reset.
+    pub fn hold_line(&mut self) {
+        self.line_held = true;
+    }
+
     /// The receive queue of a controller lets nothing go any more.
     pub fn stick_receive(&mut self, unit: Unit, now: u64) {
         self.controllers.stick_receive(unit, now);
@@ -198,6 +206,7 @@ impl Can {
 
     /// The chip is reset: both controllers are, and what had not begun on the wire never leaves.
     pub fn reset(&mut self, now: u64) {
+        self.line_held = false;
         self.controllers.reset(now);
         self.settle(now);
         self.orphan |= self.world.withdraw(ticks(now));
@@ -317,7 +326,8 @@ impl Controller {
     /// After anything: interrupt lines, and the next time to look.
     fn after(&mut self, context: &mut DeviceContext<'_>) {
         let can = self.can.lock();
-        let levels = [Line::Zero, Line::One].map(|line| can.controllers.line(self.unit, line));
+        let mut levels = [Line::Zero, Line::One].map(|line| can.controllers.line(self.unit, line));
+        levels[0] |= self.unit == Unit::One && can.line_held;
         let next = can.next();
         drop(can);
         for (position, (level, last)) in levels.into_iter().zip(&mut self.lines).enumerate() {

@@ -50,6 +50,8 @@ pub enum Kind {
     LoopLost(u64),
     /// The receive queue of the arm's controller lets nothing go any more, until its configuration is opened.
     ReceiveStuck,
+    /// The first interrupt line of the arm's controller stays up.
+    CanHeld,
     /// The serial controller says for good that a byte has come.
     SerialHeld,
     /// From this time on bank 2 does not take the keys of its control register.
@@ -88,7 +90,7 @@ pub struct Fault {
 pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off[:US], transmit-starved, receive-starved, no-acknowledge[:US], dominant[:US], \
 power-cut:N, flash-hangs:N, hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, \
 watchdog-deaf, flip:ADDRESS/BIT, loop-lost:N, time-stands, usb-held, usb-dead, \
-usb-flush-held, receive-stuck, serial-held, flash-locked, flash-deaf, reset:pin|power|brown-out|probe";
+usb-flush-held, receive-stuck, can-held, serial-held, flash-locked, flash-deaf, reset:pin|power|brown-out|probe";
 
 /// A text that names no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -125,6 +127,7 @@ impl FromStr for Fault {
             "flip" => argument.and_then(flipped).ok_or_else(wrong)?,
             "loop-lost" => Kind::LoopLost(number()?),
             "receive-stuck" => Kind::ReceiveStuck,
+            "can-held" => Kind::CanHeld,
             "serial-held" => Kind::SerialHeld,
             "flash-locked" => Kind::FlashLocked,
             "flash-deaf" => Kind::FlashDeaf,

@@ -116,6 +116,7 @@ impl Watcher {
             }
             Kind::LoopLost(number) => self.core.lock().loops_lost |= LOOP_READY << (2 * number),
             Kind::ReceiveStuck => self.can.lock().stick_receive(Unit::One, now),
+            Kind::CanHeld => self.can.lock().hold_line(),
             Kind::SerialHeld => session.board_mut().mcu.part.hold_serial(stop.at),
             Kind::FlashLocked => self.core.lock().bank_locked = true,
             Kind::FlashDeaf => self.core.lock().bank_deaf = true,

@@ -211,6 +211,31 @@ fn a_serial_line_that_says_for_good_that_a_byte_has_come_costs_that_line_and_not
 }
 
 #[test]
+fn a_can_line_that_stays_up_ends_the_torque_and_the_session_answers() {
+    let story = tell_holding(4.0, &["can-held@3000000".into()]);
+    assert!(story.resets().is_empty(), "{:?}", story.resets());
+    let learned = story.learned.lock();
+    assert!(learned.answered + 3 > learned.asked, "{} of {} questions", learned.answered, learned.asked);
+    assert_eq!(learned.fault_record.map(|record| record.fault), Some(12), "a fault of the bus");
+    assert!(!story.sent_since(3_100_000).iter().any(|(_, frame)| is_torque(frame)), "torque all the same");
+}
+
+#[test]
+fn a_second_reset_at_any_time_of_a_start_ends_the_torque_as_the_first_would_have() {
+    const RESET_US: u64 = 3_000_000;
+    // In the copying before main, in the clock tree, in the set-up of the controllers, before and after the first frames.
+    for after_us in [300, 2_500, 4_500, 6_000, 8_000] {
+        let resets = [format!("reset@{RESET_US}:pin"), format!("reset@{}:pin", RESET_US + after_us)];
+        let story = tell_holding(3.1, &resets);
+        assert_eq!(story.resets().len(), 2, "{after_us}: {:?}", story.resets());
+        begins_safely(&story, RESET_US + after_us);
+        assert!(!story.sent_since(RESET_US + 500).iter().any(|(_, frame)| is_torque(frame)), "{after_us}");
+        let first = story.sent_since(RESET_US + after_us)[0].0 - RESET_US - after_us;
+        assert!(first < 12_000, "{after_us}: {first} us after the second one");
+    }
+}
+
+#[test]
 fn after_bus_off_the_arm_is_started_up_again_and_nothing_stale_leaves() {
     both_readings(4.2, &["bus-off@2100000"], |story| {
         assert!(story.resets().is_empty(), "{:?}", story.resets());

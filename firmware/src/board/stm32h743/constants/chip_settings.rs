@@ -22,18 +22,21 @@ const fn some(address: u32, mask: u32) -> Place {
 /// In DBGMCU.APB4FZ1: the watchdog stands still while a debugger halts the core.
 pub const STANDS_IN_A_HALT: u32 = 1 << 18;
 
+/// In RCC.CSR: the oscillator of the watchdog is ready (LSIRDY).
+const WATCHDOG_CLOCK: u32 = 1 << 1;
+
 /// USART3.CR3 without the interrupt for room to send, which comes and goes.
 const WITHOUT_ROOM_TO_SEND: u32 = !(1 << 23);
 
-/// First two words of the interrupt controller's enables: FDCAN1 (19, 21), TIM2 (28), SPI1 (35), SPI2 (36), SPI3 (51).
-/// The lines of the host come and go.
-const ENABLED: [u32; 2] = [1 << 19 | 1 << 21 | 1 << 28, 1 << 3 | 1 << 4 | 1 << 19];
+/// First two words of the interrupt controller's enables: FDCAN1 (21), TIM2 (28), SPI1 (35), SPI2 (36), SPI3 (51). The
+/// lines of the host and of received frames come and go.
+const ENABLED: [u32; 2] = [1 << 21 | 1 << 28, 1 << 3 | 1 << 4 | 1 << 19];
 
 /// The system handlers' control: the memory fault has a handler. Other bits tell which handler runs.
 const MEMORY_FAULT: u32 = 1 << 16;
 
 /// Places that are looked at.
-pub const PLACES: [Place; 50] = [
+pub const PLACES: [Place; 51] = [
     // RCC: CR with the locks of the loops, CFGR.
     all(0x5802_4400),
     all(0x5802_4410),
@@ -67,7 +70,8 @@ pub const PLACES: [Place; 50] = [
     // TIM5, the time: PSC, ARR. That it runs is seen in every slot.
     all(0x4000_0C28),
     all(0x4000_0C2C),
-    // IWDG1: PR, RLR.
+    // RCC.CSR: the watchdog's oscillator runs. IWDG1: PR, RLR.
+    some(0x5802_4474, WATCHDOG_CLOCK),
     all(0x5800_4804),
     all(0x5800_4808),
     some(0x5C00_1054, STANDS_IN_A_HALT),
