@@ -91,6 +91,16 @@ fn the_words_of_a_panic_are_told_even_if_a_bit_of_them_falls_over() {
 }
 
 #[test]
+fn a_panic_while_the_controller_leaves_the_bus_sends_the_last_frames_when_it_is_back() {
+    // From the first disturbed frame to bus-off, whose INIT is read half a millisecond after its flag, and beyond.
+    for after_us in [300, 1_200, 1_500, 1_900, 2_600] {
+        let faults = [format!("bus-off:500@{SERVICE_US}"), format!("panic@{}", SERVICE_US + after_us)];
+        let story = tell_with(SERVICE_US as f64 / 1e6 + 0.1, &faults.each_ref().map(String::as_str));
+        ended_in_order(&story, SERVICE_US + after_us, "called `Option::unwrap()` on a `None` value");
+    }
+}
+
+#[test]
 fn d4_a_hard_fault_sends_the_last_frames_and_records_its_cause() {
     let story = tell_with(2.2, &["hard-fault@2100000"]);
     ended_in_order(&story, SERVICE_US, "hard fault");
@@ -223,7 +233,7 @@ fn a_can_line_that_stays_up_ends_the_torque_and_the_session_answers() {
 #[test]
 fn a_second_reset_at_any_time_of_a_start_ends_the_torque_as_the_first_would_have() {
     const RESET_US: u64 = 3_000_000;
-    // In the copying before main, in the clock tree, in the set-up of the controllers, before and after the first frames.
+    // In the copying before main, in the clock tree, in the set-up of the controllers, around the first frames.
     for after_us in [300, 2_500, 4_500, 6_000, 8_000] {
         let resets = [format!("reset@{RESET_US}:pin"), format!("reset@{}:pin", RESET_US + after_us)];
         let story = tell_holding(3.1, &resets);

@@ -50,8 +50,8 @@ const REMOTE: u32 = 1 << 29;
 const NO_ID: u16 = 0x800;
 /// Frames in a row that both queues may bring: twice what the longer one holds.
 const MOST_IN_A_ROW: u8 = 128;
-/// Most calls for a frame in a control cycle: the shortest frames are 71, and each may come with an interrupt of its own,
-/// which asks once in vain. Line 0 stands above the session, and if it stayed up nobody could stop the arm.
+/// Most calls for a frame in a control cycle: the shortest frames are 71, and each may come with an interrupt of its
+/// own, which asks once in vain. Line 0 stands above the session, and if it stayed up nobody could stop the arm.
 const MOST_ANSWERS: u8 = 240;
 /// Where the length stands in the second word.
 const LENGTH_SHIFT: u32 = 16;
