@@ -94,7 +94,7 @@ fn the_words_of_a_panic_are_told_even_if_a_bit_of_them_falls_over() {
 fn a_panic_while_the_controller_leaves_the_bus_sends_the_last_frames_when_it_is_back() {
     // From the first disturbed frame to bus-off, whose INIT is read half a millisecond after its flag, and beyond.
     for after_us in [300, 1_200, 1_500, 1_900, 2_600] {
-        let faults = [format!("bus-off:500@{SERVICE_US}"), format!("panic@{}", SERVICE_US + after_us)];
+        let faults = [format!("bus-off@{SERVICE_US}:500"), format!("panic@{}", SERVICE_US + after_us)];
         let story = tell_with(SERVICE_US as f64 / 1e6 + 0.1, &faults.each_ref().map(String::as_str));
         ended_in_order(&story, SERVICE_US + after_us, "called `Option::unwrap()` on a `None` value");
     }
