@@ -3,7 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use firmware::board::stm32h743::constants::can::{ARM, BIT_TIMING, BITS_PER_SECOND, HOST, MEMORY_WORDS, bears_both};
+use firmware::board::stm32h743::constants::can::{
+    ARM, BIT_TIMING, BIT_TIMING_OF_HSI, BITS_PER_SECOND, HOST, MEMORY_WORDS, bears_both,
+};
+use firmware::board::stm32h743::constants::can_settings::{ARM_INTERRUPTS, SETTINGS, settings};
+use firmware::board::stm32h743::constants::chip_settings::PLACES;
 use firmware::board::stm32h743::constants::clocks::*;
 use firmware::board::stm32h743::constants::filters::{
     ARM_ACCEPTED, ARM_ELEMENTS, ARM_FILTERS, ARM_IDS, HOST_DEVICE, HOST_FILTERS, accepts,
@@ -68,6 +72,56 @@ fn two_crystals_may_differ_by_far_more_than_crystals_do() {
     let resynchronise = f64::from(BIT_TIMING.jump) / (20.0 * quanta);
     let sample_flag = shorter / (2.0 * (13.0 * quanta - f64::from(BIT_TIMING.after_sample)));
     assert!(resynchronise.min(sample_flag) > 0.005, "{resynchronise} {sample_flag}");
+}
+
+#[test]
+fn the_chips_own_oscillator_makes_bits_that_a_crystal_understands() {
+    // Both run from it, and the controller wants a clock no faster than its bus.
+    let oscillator = HSI_HZ / PLL1_OF_HSI.input_divider * PLL1_OF_HSI.multiplier;
+    let clock = oscillator / PLL1_OF_HSI.q.expect("an output");
+    assert!((192_000_000..=836_000_000).contains(&oscillator) && clock <= HSI_HZ);
+    assert!((8_000_000..=16_000_000).contains(&(HSI_HZ / PLL1_OF_HSI.input_divider)));
+    let bit = BIT_TIMING_OF_HSI;
+    assert_eq!(clock, BITS_PER_SECOND * bit.prescaler * bit.quanta());
+    // By the two conditions of the CAN specification, with all of the difference on one side: it is 1 % off.
+    let shorter = f64::from(bit.before_sample.min(bit.after_sample));
+    let resynchronise = f64::from(bit.jump) / (10.0 * f64::from(bit.quanta()));
+    let sample_flag = shorter / f64::from(13 * bit.quanta() - bit.after_sample);
+    assert!(resynchronise.min(sample_flag) > 0.012, "{resynchronise} {sample_flag}");
+}
+
+#[test]
+fn the_settings_of_the_arms_controller_are_those_that_the_manual_gives_for_its_numbers() {
+    let values: Vec<(u32, u32)> =
+        settings(&ARM, &BIT_TIMING, ARM_INTERRUPTS).map(|setting| (setting.offset, setting.value)).to_vec();
+    // NBTP, IE, ILS, ILE; GFC, SIDFC, RXF0C, TXBC.
+    for expected in [
+        (0x1C, 0x0009_0401),
+        (0x54, 0x0202_0209),
+        (0x58, 0x200),
+        (0x5C, 0b11),
+        (0x80, 0x2B),
+        (0x84, 0x000D_0000),
+        (0xA0, 0x0020_0034),
+        (0xC0, 0x0800_0234),
+    ] {
+        assert!(values.contains(&expected), "{expected:x?} of {values:x?}");
+    }
+    let mut offsets: Vec<u32> = values.iter().map(|(offset, _)| *offset).collect();
+    offsets.sort_unstable();
+    offsets.dedup();
+    assert_eq!(offsets.len(), SETTINGS);
+    // A controller that nobody is told of interrupts nobody.
+    assert!(settings(&HOST, &BIT_TIMING, 0).iter().all(|setting| setting.offset & !0xF != 0x50 || setting.value == 0));
+}
+
+#[test]
+fn no_place_of_the_chip_is_watched_twice_or_in_vain() {
+    let mut addresses: Vec<u32> = PLACES.iter().map(|place| place.address).collect();
+    addresses.sort_unstable();
+    addresses.dedup();
+    assert_eq!(addresses.len(), PLACES.len());
+    assert!(PLACES.iter().all(|place| place.address.is_multiple_of(4) && place.mask != 0));
 }
 
 #[test]

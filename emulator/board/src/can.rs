@@ -52,7 +52,12 @@ pub struct Can {
     /// Frames offered to the arm's bus, and those whose end it has told.
     frames_offered: u64,
     frames_sent: u64,
+    /// The first line of the arm's controller is up for good.
+    line_held: bool,
 }
+
+/// Where the registers of the controllers begin.
+const REGISTERS: [u64; 2] = [0x4000_A000, 0x4000_A400];
 
 /// Offset of SIDFC.
 const STANDARD_FILTERS: u32 = 0x84;
@@ -94,6 +99,7 @@ impl SharedCan {
             remarks: Vec::new(),
             frames_offered: 0,
             frames_sent: 0,
+            line_held: false,
         })))
     }
 
@@ -167,6 +173,32 @@ impl Can {
         self.settle(now);
     }
 
+    /// The first interrupt line of the arm's controller stays up whatever its flags are, until a reset.
+    pub fn hold_line(&mut self) {
+        self.line_held = true;
+    }
+
+    /// The receive queue of a controller lets nothing go any more.
+    pub fn stick_receive(&mut self, unit: Unit, now: u64) {
+        self.controllers.stick_receive(unit, now);
+        self.settle(now);
+    }
+
+    /// A bit of a controller's register or of the message memory falls over. `false`: nothing of them is there.
+    pub fn flip(&mut self, address: u32, bit: u32, now: u64) -> bool {
+        let address = u64::from(address);
+        let memory = MESSAGE_MEMORY..MESSAGE_MEMORY + MESSAGE_MEMORY_BYTES;
+        if memory.contains(&address) {
+            self.controllers.flip_memory((address - MESSAGE_MEMORY) as u32, bit, now);
+        } else if let Some(unit) = Unit::BOTH.into_iter().find(|unit| address & !0xFF == REGISTERS[*unit as usize]) {
+            self.controllers.flip(unit, address as u32 & 0xFF, bit, now);
+        } else {
+            return false;
+        }
+        self.settle(now);
+        true
+    }
+
     /// Where bus-off sets INIT of a controller, it is read so many nanoseconds later.
     pub fn set_init_lag(&mut self, unit: Unit, lag: u64) {
         self.controllers.set_init_lag(unit, lag);
@@ -174,6 +206,7 @@ impl Can {
 
     /// The chip is reset: both controllers are, and what had not begun on the wire never leaves.
     pub fn reset(&mut self, now: u64) {
+        self.line_held = false;
         self.controllers.reset(now);
         self.settle(now);
         self.orphan |= self.world.withdraw(ticks(now));
@@ -293,7 +326,8 @@ impl Controller {
     /// After anything: interrupt lines, and the next time to look.
     fn after(&mut self, context: &mut DeviceContext<'_>) {
         let can = self.can.lock();
-        let levels = [Line::Zero, Line::One].map(|line| can.controllers.line(self.unit, line));
+        let mut levels = [Line::Zero, Line::One].map(|line| can.controllers.line(self.unit, line));
+        levels[0] |= self.unit == Unit::One && can.line_held;
         let next = can.next();
         drop(can);
         for (position, (level, last)) in levels.into_iter().zip(&mut self.lines).enumerate() {

@@ -64,6 +64,8 @@ pub enum Order {
     Stack(u32),
     /// Words are written to memory.
     Poke(u32, Vec<u32>),
+    /// A bit of a word falls over.
+    Flip(u32, u8),
     /// A register of the processor's own space is written by a debugger.
     Own(u32, u32),
     /// A register of the processor's own space is read, for [`CoreState::own`].
@@ -72,6 +74,17 @@ pub enum Order {
     Note(u64),
     /// The unused stack between these addresses is painted, up to the stack pointer.
     Paint(Range<u32>),
+}
+
+/// Answers of a USB controller whose queues never say that they are empty.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Flush {
+    /// They do not.
+    pub holds: bool,
+    /// A reset of the bus is told.
+    pub reset: bool,
+    /// Bits of the queues that are being emptied.
+    pub asked: u64,
 }
 
 /// State that the core and the rest of the board share.
@@ -93,6 +106,14 @@ pub struct CoreState {
     pub double_error: bool,
     /// The USB controller has no clock from its transceiver: a reset of it does not end.
     pub usb_dead: bool,
+    /// Bank 2 does not take the keys of its control register.
+    pub bank_locked: bool,
+    /// Bank 2 does nothing that it is told to.
+    pub bank_deaf: bool,
+    /// Queues of the USB controller that never say that they are empty.
+    pub usb_flush: Flush,
+    /// Flags of RCC.CR that are read as 0: loops that have lost their lock.
+    pub loops_lost: u32,
     /// An operation of bank 2 does not end.
     pub bank_hangs: bool,
 }
@@ -206,6 +227,15 @@ impl Core {
                 }
                 Order::Stack(address) => self.set_register(register::SP, address),
                 Order::Poke(address, words) => poke(bus, address, &words),
+                Order::Flip(address, bit) if is_own(address) => {
+                    let value = self.own(u64::from(address), None);
+                    self.own(u64::from(address), Some(value ^ 1 << bit));
+                }
+                Order::Flip(address, bit) => {
+                    let read = Access::new(AccessKind::Read, u64::from(address), Width::W32, 0);
+                    let value = bus.access(read, false).unwrap_or(0);
+                    poke(bus, address, &[value as u32 ^ 1 << bit]);
+                }
                 Order::Own(address, value) => {
                     self.own(u64::from(address), Some(u64::from(value)));
                 }
@@ -225,6 +255,11 @@ impl Core {
             }
         }
     }
+}
+
+/// True if the processor itself answers at an address.
+fn is_own(address: u32) -> bool {
+    address >> 20 == 0xE00
 }
 
 fn poke(bus: &mut dyn CoreBus, address: u32, words: &[u32]) {

@@ -44,6 +44,22 @@ pub enum Kind {
     UsbHeld,
     /// The USB controller has no clock: a reset of it never ends.
     UsbDead,
+    /// A bit falls over in a register or in the message memory: of the word at this address.
+    Flip(u32, u8),
+    /// A phase-locked loop (0 to 2) has lost its lock, until a reset; its output goes on.
+    LoopLost(u64),
+    /// The receive queue of the arm's controller lets nothing go any more, until its configuration is opened.
+    ReceiveStuck,
+    /// The first interrupt line of the arm's controller stays up.
+    CanHeld,
+    /// The serial controller says for good that a byte has come.
+    SerialHeld,
+    /// From this time on bank 2 does not take the keys of its control register.
+    FlashLocked,
+    /// From this time on bank 2 does nothing that it is told to, and tells nothing.
+    FlashDeaf,
+    /// The USB controller tells a reset of its bus, and a queue that is emptied then never says that it is empty.
+    UsbFlushHeld,
     /// A reset of this kind.
     Reset(ResetKind),
 }
@@ -73,7 +89,8 @@ pub struct Fault {
 /// Forms that the command line takes.
 pub const SYNTAX: &str = "KIND@MICROSECONDS[:ARGUMENT], KIND one of bus-off[:US], transmit-starved, receive-starved, no-acknowledge[:US], dominant[:US], \
 power-cut:N, flash-hangs:N, hse-dead, nmi, panic, hard-fault, hang, stall:US, guard, below-guard, \
-watchdog-deaf, time-stands, usb-held, usb-dead, reset:pin|power|brown-out|probe";
+watchdog-deaf, flip:ADDRESS/BIT, loop-lost:N, time-stands, usb-held, usb-dead, \
+usb-flush-held, receive-stuck, can-held, serial-held, flash-locked, flash-deaf, reset:pin|power|brown-out|probe";
 
 /// A text that names no fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -107,6 +124,14 @@ impl FromStr for Fault {
             "below-guard" => Kind::BelowGuard,
             "time-stands" => Kind::TimeStands,
             "watchdog-deaf" => Kind::WatchdogDeaf,
+            "flip" => argument.and_then(flipped).ok_or_else(wrong)?,
+            "loop-lost" => Kind::LoopLost(number()?),
+            "receive-stuck" => Kind::ReceiveStuck,
+            "can-held" => Kind::CanHeld,
+            "serial-held" => Kind::SerialHeld,
+            "flash-locked" => Kind::FlashLocked,
+            "flash-deaf" => Kind::FlashDeaf,
+            "usb-flush-held" => Kind::UsbFlushHeld,
             "usb-dead" => Kind::UsbDead,
             "usb-held" => Kind::UsbHeld,
             "reset" => Kind::Reset(match argument {
@@ -122,6 +147,13 @@ impl FromStr for Fault {
     }
 }
 
+/// Address, hexadecimal, and bit.
+fn flipped(text: &str) -> Option<Kind> {
+    let (address, bit) = text.strip_prefix("0x")?.split_once('/')?;
+    let (address, bit) = (u32::from_str_radix(address, 16).ok()?, bit.parse().ok().filter(|bit| *bit < 32)?);
+    Some(Kind::Flip(address, bit))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -134,7 +166,17 @@ mod tests {
         assert_eq!("power-cut@2000000:7".parse(), Ok(Fault { kind: Kind::PowerCut(7), at }));
         let kind = Kind::Reset(ResetKind::BrownOut);
         assert_eq!("reset@2000000:brown-out".parse(), Ok(Fault { kind, at }));
-        for text in ["bus-off", "fire@1", "stall@x", "reset@1", "reset@1:kick", "panic@99999999999999999999"] {
+        assert_eq!("flip@2000000:0x4000a01c/16".parse(), Ok(Fault { kind: Kind::Flip(0x4000_A01C, 16), at }));
+        for text in [
+            "flip@1:0x0/32",
+            "flip@1:7",
+            "bus-off",
+            "fire@1",
+            "stall@x",
+            "reset@1",
+            "reset@1:kick",
+            "panic@99999999999999999999",
+        ] {
             assert!(text.parse::<Fault>().is_err(), "{text}");
         }
     }

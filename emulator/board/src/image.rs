@@ -91,6 +91,8 @@ pub struct Image {
     pub model_hash: u32,
     /// The log's control block.
     pub log_control: u32,
+    /// Where the words of the last stop are kept, if it keeps any.
+    pub kept_words: Option<u32>,
     functions: BTreeMap<u32, (u32, String)>,
 }
 
@@ -138,6 +140,8 @@ impl Image {
         let symbol = |name: &'static str| {
             named.get(name).copied().ok_or_else(|| ImageError::Symbol { path: path.clone(), name })
         };
+        let is_place = |name: &str| name.contains("panic_reason") && name.contains("PLACE");
+        let kept_words = named.iter().find(|(name, _)| is_place(name)).map(|(_, address)| *address);
         let stack = symbol("_stack_end")?..symbol("_stack_start")?;
         let log_control = symbol("_SEGGER_RTT")?;
         Ok(Self {
@@ -148,6 +152,7 @@ impl Image {
             firmware,
             stack,
             log_control,
+            kept_words,
             functions,
             path,
             bytes,

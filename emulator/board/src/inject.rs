@@ -7,7 +7,7 @@ use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
 use crate::board::Board;
-use crate::core::Order;
+use crate::core::{Flush, Order};
 use crate::fault::{Kind, ResetKind};
 use crate::watcher::Watcher;
 
@@ -32,6 +32,9 @@ const RECURSION: u32 = 0xE7FD_B5FF;
 /// ICSR and its bit that makes a non-maskable interrupt pending.
 const INTERRUPT_CONTROL: u32 = 0xE000_ED04;
 const PEND_NMI: u32 = 1 << 31;
+
+/// RCC.CR: the first loop is locked; the flags of the others stand two higher each.
+const LOOP_READY: u32 = 1 << 25;
 
 /// TIM5_CR1.
 const TIME_CONTROL: u32 = 0x4000_0C00;
@@ -106,6 +109,21 @@ impl Watcher {
             Kind::BelowGuard => self.overflow(BELOW_MEMORY),
             // CEN goes, and nothing else of the register was set.
             Kind::TimeStands => self.core.lock().orders.push(Order::Poke(TIME_CONTROL, vec![0])),
+            Kind::Flip(address, bit) => {
+                if !self.can.lock().flip(address, u32::from(bit), now) {
+                    self.core.lock().orders.push(Order::Flip(address, bit));
+                }
+            }
+            Kind::LoopLost(number) => self.core.lock().loops_lost |= LOOP_READY << (2 * number),
+            Kind::ReceiveStuck => self.can.lock().stick_receive(Unit::One, now),
+            Kind::CanHeld => self.can.lock().hold_line(),
+            Kind::SerialHeld => session.board_mut().mcu.part.hold_serial(stop.at),
+            Kind::FlashLocked => self.core.lock().bank_locked = true,
+            Kind::FlashDeaf => self.core.lock().bank_deaf = true,
+            Kind::UsbFlushHeld => {
+                self.core.lock().usb_flush = Flush { holds: true, reset: true, ..Flush::default() };
+                session.board_mut().mcu.part.hold_usb(stop.at);
+            }
             Kind::WatchdogDeaf => self.watch.deafen(),
             Kind::UsbDead => self.core.lock().usb_dead = true,
             Kind::UsbHeld => session.board_mut().mcu.part.hold_usb(stop.at),

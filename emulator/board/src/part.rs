@@ -9,7 +9,7 @@ use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
 
 use crate::can::{Controller, SharedCan};
-use crate::core::SharedCore;
+use crate::core::{Flush, SharedCore};
 use crate::serial::{Serial, SharedLine};
 use crate::usb::{DeviceRole, PowerGate};
 use crate::watchdog::{SharedWatch, Watchdog};
@@ -141,6 +141,14 @@ impl Part {
         context.raise(USB_GLOBAL);
     }
 
+    /// The serial controller says for good that a byte has come.
+    pub fn hold_serial(&mut self, at: VirtualNanos) {
+        let mut serial = std::mem::replace(&mut self.serial, Serial::new(SharedLine::default()));
+        let (registers, mut context) = self.chip.bus_mut().drive(at, self.slots.serial);
+        serial.hold(registers, &mut context);
+        self.serial = serial;
+    }
+
     /// Says that the last reset had these causes, flags of RCC.RSR.
     pub fn set_reset_flags(&mut self, flags: u64) {
         let (_, registers) = self.chip.clocks();
@@ -161,7 +169,11 @@ impl Mcu for Part {
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.chip.reset(at, cause);
         self.can.lock().reset(at.0);
-        self.core.lock().bank_hangs = false;
+        {
+            let mut core = self.core.lock();
+            (core.bank_hangs, core.bank_locked, core.bank_deaf) = (false, false, false);
+            (core.loops_lost, core.usb_flush) = (0, Flush::default());
+        }
         for slot in self.slots.can.into_iter().chain([self.slots.watchdog, self.slots.serial]) {
             if let (_, Some(model)) = self.split(slot) {
                 model.reset();

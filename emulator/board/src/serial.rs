@@ -21,6 +21,8 @@ const BITS_PER_BYTE: u64 = 10;
 const RTOIE: u64 = 1 << 26;
 const RTOEN: u64 = 1 << 23;
 const RTOF: u64 = 1 << 11;
+/// ISR RXNE: a byte has come.
+const RXNE: u64 = 1 << 5;
 /// CR1.UE and CR1.RE.
 const RECEIVING: u64 = 1 | 1 << 2;
 /// CR1.OVER8.
@@ -107,6 +109,8 @@ pub struct Serial {
     /// When the silence will have lasted.
     due: Option<u64>,
     flag: bool,
+    /// A byte seems to have come, for good.
+    stuck: bool,
     /// We hold the interrupt line up, whatever the model thinks.
     holding: bool,
 }
@@ -117,7 +121,13 @@ impl Serial {
     pub fn new(line: SharedLine) -> Self {
         let mut usart = Usart::new();
         usart.attach(line.clone());
-        Self { usart, line, kernel_hz: 0, seen: None, due: None, flag: false, holding: false }
+        Self { usart, line, kernel_hz: 0, seen: None, due: None, flag: false, stuck: false, holding: false }
+    }
+
+    /// A byte seems to have come from now on, until a reset.
+    pub fn hold(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        self.stuck = true;
+        self.settle(registers, context);
     }
 
     /// Nanoseconds of `bits` bits.
@@ -148,7 +158,7 @@ impl Serial {
             self.due = None;
             self.flag = registers.get(Register::Cr2) & RTOEN != 0;
         }
-        let wanted = self.flag && registers.get(Register::Cr1) & RTOIE != 0;
+        let wanted = self.stuck || self.flag && registers.get(Register::Cr1) & RTOIE != 0;
         if wanted {
             context.interrupt(0, Level::High);
             self.holding = true;
@@ -160,7 +170,9 @@ impl Serial {
 
     /// ISR with the time-out's flag.
     fn status(&self, registers: &RegisterFile) -> u64 {
-        registers.get(Register::Isr) & !RTOF | if self.flag { RTOF } else { 0 }
+        let timed_out = if self.flag { RTOF } else { 0 };
+        let come = if self.stuck { RXNE } else { 0 };
+        registers.get(Register::Isr) & !RTOF | timed_out | come
     }
 }
 
@@ -220,6 +232,6 @@ impl Device for Serial {
     fn reset(&mut self) {
         Device::reset(&mut self.usart);
         self.seen = self.line.begun();
-        (self.due, self.flag, self.holding) = (None, false, false);
+        (self.due, self.flag, self.stuck, self.holding) = (None, false, false, false);
     }
 }

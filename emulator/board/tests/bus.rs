@@ -68,3 +68,24 @@ fn a_received_frame_that_could_not_be_stored_is_counted_and_the_arm_holds_on() {
     assert!(statistics.bus_errors == 1 && statistics.lost_replies <= 1, "{statistics:?}");
     assert_eq!(learned.status.as_ref().map(|status| status.state), Some(HOLD), "{:?}", learned.status);
 }
+
+#[test]
+fn a_bit_of_a_setting_that_falls_over_is_a_fault_and_the_controller_is_set_up_anew() {
+    for (bit, reason) in [
+        // Divider of the bit timing; what matches no filter is taken; the interrupt of a received frame.
+        ("0x4000a01c/16", BUS_FAULT),
+        ("0x4000a080/5", BUS_FAULT),
+        ("0x4000a054/0", BUS_FAULT),
+        // Places of the receive queue; the filter of a joint's replies; that of the safety module's.
+        ("0x4000a0a0/21", BUS_FAULT),
+        ("0x4000ac08/20", BUS_FAULT),
+        ("0x4000ac2c/5", BUS_FAULT),
+    ] {
+        falls_and_holds_again(&format!("flip:{bit}"), Cancellation::Skipped, 60_000, reason);
+    }
+}
+
+#[test]
+fn a_receive_queue_that_lets_nothing_go_is_a_fault_and_is_opened_anew() {
+    falls_and_holds_again("receive-stuck", Cancellation::Skipped, 60_000, BUS_FAULT);
+}

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Story, is_torque, safe_frames, tell, tell_holding, tell_with};
+use common::{Story, image, is_torque, safe_frames, tell, tell_holding, tell_with};
 use emulated_board::setup::Setup;
 use fdcan_model::Cancellation;
 use puck::CanFrame;
@@ -73,6 +73,30 @@ fn d4_a_panic_whose_last_frames_cannot_be_read_in_time_sends_them_again() {
         let faults = [format!("panic@{SERVICE_US}"), format!("transmit-starved@{}", SERVICE_US + after_us)];
         let story = tell_with(SERVICE_US as f64 / 1e6 + 0.1, &faults.each_ref().map(String::as_str));
         ended_in_order(&story, SERVICE_US, "called `Option::unwrap()` on a `None` value");
+    }
+}
+
+#[test]
+fn the_words_of_a_panic_are_told_even_if_a_bit_of_them_falls_over() {
+    let panic = format!("panic@{SERVICE_US}");
+    let whole = tell_with(SERVICE_US as f64 / 1e6 + 0.1, &[&panic]);
+    let (reset_us, _) = whole.resets()[0];
+    let place = image().kept_words.expect("a place of the last words");
+    // Of the mark, the length, the check sum, the text; an upper bit of the length would be beyond the words.
+    for (word, bit) in [(0, 7), (4, 0), (4, 30), (8, 31), (12, 3)] {
+        let flip = format!("flip@{}:{:#x}/{bit}", reset_us + 1_000, place + word);
+        let story = tell_with(SERVICE_US as f64 / 1e6 + 0.1, &[&panic, &flip]);
+        ended_in_order(&story, SERVICE_US, "` on a `None` val");
+    }
+}
+
+#[test]
+fn a_panic_while_the_controller_leaves_the_bus_sends_the_last_frames_when_it_is_back() {
+    // From the first disturbed frame to bus-off, whose INIT is read half a millisecond after its flag, and beyond.
+    for after_us in [300, 1_200, 1_500, 1_900, 2_600] {
+        let faults = [format!("bus-off@{SERVICE_US}:500"), format!("panic@{}", SERVICE_US + after_us)];
+        let story = tell_with(SERVICE_US as f64 / 1e6 + 0.1, &faults.each_ref().map(String::as_str));
+        ended_in_order(&story, SERVICE_US + after_us, "called `Option::unwrap()` on a `None` value");
     }
 }
 
@@ -176,6 +200,52 @@ fn c3_a_usb_line_that_stays_up_keeps_the_session_from_nothing() {
 }
 
 #[test]
+fn a_usb_queue_that_never_says_that_it_is_empty_costs_the_usb_line_and_nothing_else() {
+    let quiet = tell_with(3.1, &[]).learned.lock().answered;
+    let story = tell_with(3.1, &["usb-flush-held@2100000"]);
+    assert!(story.resets().is_empty(), "{:?}", story.resets());
+    let learned = story.learned.lock();
+    assert!(learned.answered + 3 > quiet, "{} of {} questions, {quiet} without", learned.answered, learned.asked);
+    assert_eq!(learned.statistics.expect("statistics").missed_deadlines, 0);
+}
+
+#[test]
+fn a_serial_line_that_says_for_good_that_a_byte_has_come_costs_that_line_and_nothing_else() {
+    let story = tell_holding(3.5, &["serial-held@3000000".into()]);
+    assert!(story.resets().is_empty(), "{:?}", story.resets());
+    // Nobody can ask any more: the arm is held by 300 cycles a second as before.
+    let torques =
+        |from: u64, to: u64| story.sent_since(from).iter().filter(|(at, frame)| *at < to && is_torque(frame)).count();
+    let (before, after) = (torques(2_900_000, 3_000_000), torques(3_400_000, 3_500_000));
+    assert!(before >= 29 && after.abs_diff(before) <= 2, "{before} torques in a tenth of a second, then {after}");
+}
+
+#[test]
+fn a_can_line_that_stays_up_ends_the_torque_and_the_session_answers() {
+    let story = tell_holding(4.0, &["can-held@3000000".into()]);
+    assert!(story.resets().is_empty(), "{:?}", story.resets());
+    let learned = story.learned.lock();
+    assert!(learned.answered + 3 > learned.asked, "{} of {} questions", learned.answered, learned.asked);
+    assert_eq!(learned.fault_record.map(|record| record.fault), Some(12), "a fault of the bus");
+    assert!(!story.sent_since(3_100_000).iter().any(|(_, frame)| is_torque(frame)), "torque all the same");
+}
+
+#[test]
+fn a_second_reset_at_any_time_of_a_start_ends_the_torque_as_the_first_would_have() {
+    const RESET_US: u64 = 3_000_000;
+    // In the copying before main, in the clock tree, in the set-up of the controllers, around the first frames.
+    for after_us in [300, 2_500, 4_500, 6_000, 8_000] {
+        let resets = [format!("reset@{RESET_US}:pin"), format!("reset@{}:pin", RESET_US + after_us)];
+        let story = tell_holding(3.1, &resets);
+        assert_eq!(story.resets().len(), 2, "{after_us}: {:?}", story.resets());
+        begins_safely(&story, RESET_US + after_us);
+        assert!(!story.sent_since(RESET_US + 500).iter().any(|(_, frame)| is_torque(frame)), "{after_us}");
+        let first = story.sent_since(RESET_US + after_us)[0].0 - RESET_US - after_us;
+        assert!(first < 12_000, "{after_us}: {first} us after the second one");
+    }
+}
+
+#[test]
 fn after_bus_off_the_arm_is_started_up_again_and_nothing_stale_leaves() {
     both_readings(4.2, &["bus-off@2100000"], |story| {
         assert!(story.resets().is_empty(), "{:?}", story.resets());
@@ -224,11 +294,63 @@ fn a_crystal_that_is_dead_from_the_start_does_not_leave_the_image_waiting_for_ev
 }
 
 #[test]
+fn a_crystal_that_dies_under_torque_ends_the_torque_by_the_chips_own_oscillator() {
+    let story = tell_holding(3.9, &["hse-dead@3000000".into()]);
+    assert!(story.sent_since(2_990_000).iter().any(|(at, frame)| *at < 3_000_000 && is_torque(frame)), "no torque");
+    let (reset_us, _) = story.resets()[0];
+    let last = story.sent_since(reset_us);
+    let frames: Vec<CanFrame> = last.iter().map(|(_, frame)| *frame).collect();
+    // Once, and nothing else: the rate is not exact.
+    assert_eq!(frames, safe_frames());
+    assert!(last.iter().all(|(at, _)| at - 3_000_000 < 12_000), "{last:?}");
+    // It goes on trying as a board does that never had a clock.
+    assert!(story.resets().len() >= 3, "{:?}", story.resets());
+}
+
+#[test]
 fn a_crystal_that_dies_in_service_ends_the_image_and_not_the_arm() {
     let story = tell_with(2.2, &["hse-dead@2100000"]);
     let resets = story.resets();
     assert!(!resets.is_empty(), "it goes on at another rate");
     assert!(resets[0].0 - SERVICE_US < 12_000, "{resets:?}");
+}
+
+/// The image ends within a few hundredths of a second after a bit has fallen over, and its successor says which.
+fn ends_for_a_setting(fault: &str, address: &str) {
+    let story = tell_with(2.4, &[fault]);
+    let resets = story.resets();
+    assert_eq!(resets.len(), 1, "{fault}: {resets:?}");
+    let (reset_us, cause) = resets[0];
+    assert_eq!(cause, "Core", "{fault}: by itself");
+    assert!(reset_us - SERVICE_US < 100_000, "{fault}: {} us after the fault", reset_us - SERVICE_US);
+    begins_safely(&story, reset_us);
+    assert!(story.log_says("a setting of the chip has changed"), "{fault}: {:#?}", story.log());
+    assert!(story.log_says(address), "{fault}: {:#?}", story.log());
+}
+
+#[test]
+fn a_bit_of_a_setting_of_the_chip_that_falls_over_ends_the_image_and_the_next_one_tells_it() {
+    for (address, bit) in [
+        // Divider of the slots; wait states of the flash; source of the CAN clock; pin of the arm's bus; rate of the
+        // serial line; priority of the slots; protection unit; the watchdog, which a debugger lets stand in a halt.
+        ("0x40000028", 0),
+        ("0x52002000", 3),
+        ("0x58024450", 29),
+        ("0x58020c20", 5),
+        ("0x4000480c", 9),
+        ("0xe000e41c", 5),
+        ("0xe000ed94", 1),
+        ("0x5c001054", 18),
+    ] {
+        ends_for_a_setting(&format!("flip@{SERVICE_US}:{address}/{bit}"), address);
+    }
+}
+
+#[test]
+fn a_loop_that_loses_its_lock_ends_the_image() {
+    for number in [0, 2] {
+        ends_for_a_setting(&format!("loop-lost@{SERVICE_US}:{number}"), "0x58024400");
+    }
 }
 
 /// Runs the image for a second beyond a fault that ends in a restart.

@@ -50,3 +50,18 @@ fn c5_a_restart_trusts_a_flash_again_that_hung() {
     assert!(before > 0 && after > 0, "{:?}", learned.kept);
     assert!(learned.storage.as_ref().is_some_and(|storage| storage.bad_sector.is_none()), "{:?}", learned.storage);
 }
+
+#[test]
+fn a_bank_that_does_not_do_what_it_is_told_is_told_of_and_the_arm_holds_on() {
+    for fault in ["flash-locked", "flash-deaf"] {
+        let story = tell_keeping(4.0, &[format!("{fault}@{HANGS_US}")]);
+        assert!(story.resets().is_empty(), "{fault}: {:?}", story.resets());
+        let learned = story.learned.lock();
+        assert_eq!(learned.kept.first(), Some(&None), "{fault}: it is kept before");
+        let last = learned.kept.last().expect("an answer");
+        assert!(last.is_some(), "{fault}: {:?}", learned.kept);
+        let status = learned.status.as_ref().expect("a status");
+        assert_eq!((status.state, status.fault), (HOLD, 0), "{fault}: {status:?}");
+        assert_eq!(learned.statistics.expect("statistics").missed_deadlines, 0, "{fault}");
+    }
+}

@@ -114,6 +114,18 @@ impl Controller {
         BitTiming::new(self.value(NBTP), self.kernel_hz)
     }
 
+    /// The first receive FIFO lets nothing go any more.
+    pub(crate) fn stick_receive(&mut self) {
+        self.fifos[0].get_stuck();
+        self.raise(registers::ir::NEW);
+    }
+
+    /// A bit of a register falls over.
+    pub(crate) fn flip(&mut self, offset: u32, bit: u32) {
+        self.set_value(offset, self.value(offset) ^ 1 << (bit & 31));
+        self.refresh_wire();
+    }
+
     /// The time `bits` after `from`; `None` while the kernel clock stands.
     pub(crate) fn after(&self, from: Nanoseconds, bits: u32) -> Option<Nanoseconds> {
         Some(from + self.timing()?.bits(bits))

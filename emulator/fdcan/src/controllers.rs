@@ -256,6 +256,25 @@ impl Controllers {
         self.unit(unit).starve(handler);
     }
 
+    /// The first receive FIFO of a controller lets nothing go any more, whatever is acknowledged, until its
+    /// configuration is opened.
+    pub fn stick_receive(&mut self, unit: Unit, now: Nanoseconds) {
+        self.advance(now);
+        self.unit(unit).stick_receive();
+    }
+
+    /// A bit of a register falls over, whoever may write it: of one that keeps what is written.
+    pub fn flip(&mut self, unit: Unit, offset: u32, bit: u32, now: Nanoseconds) {
+        self.advance(now);
+        self.unit(unit).flip(offset, bit);
+    }
+
+    /// A bit of the message memory falls over.
+    pub fn flip_memory(&mut self, offset: u32, bit: u32, now: Nanoseconds) {
+        self.advance(now);
+        self.memory.flip(offset / 4, bit);
+    }
+
     /// From now on, where bus-off sets CCCR.INIT, it can be read so much later than a written one would be.
     pub fn set_init_lag(&mut self, unit: Unit, lag: Nanoseconds) {
         self.unit(unit).link.init_lag = lag;

@@ -28,6 +28,13 @@ impl Memory {
         self.written.get(word as usize).copied().unwrap_or(false)
     }
 
+    /// Turns a bit of a word over; behind the end there is none.
+    pub(crate) fn flip(&mut self, word: u32, bit: u32) {
+        if let Some(place) = self.words.get_mut(word as usize) {
+            *place ^= 1 << (bit & 31);
+        }
+    }
+
     /// Writes a word; `false` if there is no such word.
     pub(crate) fn set(&mut self, word: u32, value: u32) -> bool {
         let Some(place) = self.words.get_mut(word as usize) else { return false };

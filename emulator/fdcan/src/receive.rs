@@ -54,11 +54,16 @@ pub(crate) struct Stored {
 pub(crate) struct ReceiveFifo {
     get: u32,
     fill: u32,
+    /// The get index does not move, whatever is acknowledged, and a frame seems to be there.
+    stuck: bool,
 }
 
 impl ReceiveFifo {
     /// RXFnS, without the bit "lost", which is a copy of IR.
     pub(crate) fn status(&self, layout: &Layout) -> u32 {
+        if self.stuck {
+            return self.fill.max(1) | self.get << 8;
+        }
         let full = u32::from(layout.size > 0 && self.fill == layout.size);
         let put = if layout.size > 0 { (self.get + self.fill) % layout.size } else { 0 };
         self.fill | self.get << 8 | put << 16 | full << 24
@@ -69,6 +74,9 @@ impl ReceiveFifo {
         if layout.size == 0 || index >= layout.size {
             return false;
         }
+        if self.stuck {
+            return true;
+        }
         let taken = (index + layout.size - self.get) % layout.size + 1;
         let is_held = taken <= self.fill;
         let put = self.get + self.fill;
@@ -76,6 +84,11 @@ impl ReceiveFifo {
         // The silicon does not check: a wrong index moves the get index all the same.
         self.fill = if is_held { self.fill - taken } else { (put + layout.size - self.get) % layout.size };
         is_held
+    }
+
+    /// From now on nothing that is acknowledged leaves, until the configuration is opened.
+    pub(crate) fn get_stuck(&mut self) {
+        self.stuck = true;
     }
 
     /// Stores a frame.

@@ -39,6 +39,16 @@ impl<M: Mutex<T = &'static mut ArmSession>, L: Log> LibraryAccess for SharedLibr
         self.log.storage(&opening);
     }
 
+    fn fail(&mut self, error: StoreError) {
+        let opening = self.session.lock(|session| {
+            session.store_mut().fail(error);
+            session.store_mut().opening()
+        });
+        if let Some(opening) = opening {
+            self.log.storage(&opening);
+        }
+    }
+
     fn take(&mut self, image: &mut [u8]) -> Option<Work> {
         self.session.lock(|session| session.store_mut().take(image))
     }

@@ -62,6 +62,9 @@ pub trait LibraryAccess {
     /// All of the flash has been read.
     fn open(&mut self, opening: Opening);
 
+    /// The flash fails though nobody has asked anything of it.
+    fn fail(&mut self, error: StoreError);
+
     /// A change to make durable; the image to save is copied into `image`.
     fn take(&mut self, image: &mut [u8]) -> Option<Work>;
 
@@ -91,7 +94,10 @@ pub async fn keep<F: NorFlash, D: LibraryAccess, const IMAGE: usize, const VALUE
     if let Ok(open) = &mut log
         && let Err(error) = clean(open).await
     {
-        log = Err(medium(error));
+        let error = medium(error);
+        // At once: whoever learned of it from a refused change would have relied on the storage until then.
+        library.fail(error);
+        log = Err(error);
     }
     loop {
         let Some(work) = library.take(image) else {

@@ -202,16 +202,22 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         };
         match outcome {
             Ok(()) => self.make_good(work),
-            Err(StoreError::Sector(sector)) => self.opening.bad_sector = Some(sector),
-            // The keeper asks it nothing more before a restart.
-            Err(StoreError::Medium) => self.opening.failed = true,
-            Err(_) => {}
+            Err(error) => self.fail(error),
         }
         let _ = self.memory.finished();
         if outcome.is_err() && !work.is_of_setting() {
             self.memory.abort();
         }
         self.job = Job::Over(outcome);
+    }
+
+    /// The flash has failed: the keeper asks it nothing more before a restart.
+    pub fn fail(&mut self, error: StoreError) {
+        match error {
+            StoreError::Sector(sector) => self.opening.bad_sector = Some(sector),
+            StoreError::Medium => self.opening.failed = true,
+            _ => {}
+        }
     }
 
     /// Another value stands there now: nobody misses the lost one.

@@ -46,6 +46,10 @@ impl<const SLOTS: usize> LibraryAccess for Shared<SLOTS> {
         self.library().open(opening);
     }
 
+    fn fail(&mut self, error: StoreError) {
+        self.library().fail(error);
+    }
+
     fn take(&mut self, image: &mut [u8]) -> Option<Work> {
         self.library().take(image)
     }
@@ -205,6 +209,10 @@ impl LibraryAccess for Forger<'_> {
     fn lose(&mut self, _: u8, _: &[u8]) {}
 
     fn open(&mut self, _: Opening) {}
+
+    fn fail(&mut self, error: StoreError) {
+        panic!("{error:?}");
+    }
 
     fn take(&mut self, room: &mut [u8]) -> Option<Work> {
         let (slot, bytes) = self.0.take()?;

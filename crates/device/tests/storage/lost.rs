@@ -196,3 +196,16 @@ fn h11_a_sector_that_cannot_be_erased_is_told_and_what_the_others_hold_is_read_a
     assert_eq!(shared.library().image(0), Some(named(8).as_slice()));
     assert_eq!(shared.library().image(3), Some(newest.as_slice()));
 }
+
+#[test]
+fn a_blank_sector_with_a_fallen_bit_that_cannot_be_erased_is_told_before_anybody_asks() {
+    const SECTOR: u32 = 3;
+    let mut content = library();
+    let word = SECTOR as usize * SECTOR_BYTES + 100 * 32;
+    assert!(content[word..word + 32].iter().all(|byte| *byte == 0xFF), "the sector is in use");
+    content[word] &= !1;
+    let (shared, _) = run::<4, _>(Worn::new(&chip(&content), SECTOR, u32::MAX), &[]);
+    let library = shared.library();
+    assert_eq!((library.report(0).bad_sector, library.report(0).failed), (Some(3), false));
+    assert_eq!((library.image(0), library.home()), (Some(named(1).as_slice()), StoredHome::Kept(home(5))));
+}

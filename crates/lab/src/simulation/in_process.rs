@@ -72,6 +72,10 @@ impl LibraryAccess for SharedSession {
         self.lock().store_mut().open(opening);
     }
 
+    fn fail(&mut self, error: StoreError) {
+        self.lock().store_mut().fail(error);
+    }
+
     fn take(&mut self, image: &mut [u8]) -> Option<Work> {
         self.lock().store_mut().take(image)
     }

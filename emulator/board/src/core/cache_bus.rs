@@ -38,9 +38,24 @@ const MEMORIES: [(u64, u64); 9] = [
 const BANK_STATUS: u64 = 0x5200_2110;
 const BUSY: u64 = 0b101;
 
+/// Address of RCC.CR.
+const CLOCK_CONTROL: u64 = 0x5802_4400;
+
 /// Address of GRSTCTL of the USB controller, and its bit CSRST: it is being reset.
 const USB_RESET: u64 = 0x4008_0010;
 const USB_RESETS: u64 = 1;
+
+/// Its bits of queues that are being emptied.
+const USB_FLUSHES: u64 = 0b11 << 4;
+
+/// Address of GINTSTS of the USB controller, and its bit USBRST: the bus is reset.
+const USB_STATUS: u64 = 0x4008_0014;
+const USB_BUS_RESET: u64 = 1 << 12;
+
+/// Addresses of FLASH.KEYR2 and FLASH.CR2, and the latter's bit START2.
+const BANK_KEY: u64 = 0x5200_2104;
+const BANK_CONTROL: u64 = 0x5200_210C;
+const BANK_START: u64 = 1 << 7;
 
 /// The peripherals, and the processor's own space.
 const PERIPHERALS: [(u64, u64); 2] = [(0x4000_0000, 0x5FFF_FFFF), (0xE000_0000, 0xE00F_FFFF)];
@@ -73,6 +88,19 @@ impl<'a> CacheBus<'a> {
     fn verdict_for(&self, access: &Access) -> Option<bool> {
         let (pc, count, cacheable) = self.verdict?;
         (pc == access.program_counter && count == access.instruction_count).then_some(cacheable)
+    }
+
+    /// Notes what a write begins, and tells whether a fault keeps it from the chip.
+    fn is_lost(&self, access: &Access) -> bool {
+        let mut state = self.shared.lock();
+        match access.address {
+            USB_RESET => state.usb_flush.asked |= access.value & USB_FLUSHES,
+            USB_STATUS if access.value & USB_BUS_RESET != 0 => state.usb_flush.reset = false,
+            BANK_KEY => return state.bank_locked,
+            BANK_CONTROL => return state.bank_deaf && access.value & BANK_START != 0,
+            address => return state.bank_deaf && in_bank(address),
+        }
+        false
     }
 
     fn read_bank(&mut self, access: Access, from_code: bool) -> Option<u64> {
@@ -134,12 +162,18 @@ impl CoreBus for CacheBus<'_> {
             });
             return None;
         }
+        if access.kind == AccessKind::Write && self.is_lost(&access) {
+            return Some(0);
+        }
         let value = self.inner.access(access, from_code)?;
         if access.kind != AccessKind::Read {
             return Some(value);
         }
         Some(match access.address {
             BANK_STATUS if self.shared.lock().bank_hangs => value | BUSY,
+            CLOCK_CONTROL => value & !u64::from(self.shared.lock().loops_lost),
+            USB_RESET if self.shared.lock().usb_flush.holds => value | self.shared.lock().usb_flush.asked,
+            USB_STATUS if self.shared.lock().usb_flush.reset => value | USB_BUS_RESET,
             USB_RESET if self.shared.lock().usb_dead => value | USB_RESETS,
             _ => value,
         })

@@ -22,6 +22,10 @@ const TO_ACKNOWLEDGE_BITS: u32 = 2;
 /// A burst of disturbance hits the first dominant bit behind the identifier: start of frame 1, identifier 11, that bit.
 const TO_DISTURBED_BIT: u32 = 13;
 
+/// Rate of the bus, bits a second, and how far a controller may be off it: nobody understands one that is further off.
+const BUS_HZ: u32 = 1_000_000;
+const OFF_HZ: u32 = BUS_HZ / 100;
+
 /// Event that the wire must be told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WireEvent {
@@ -132,7 +136,7 @@ impl Controller {
             // What waits still waits: the manual says that sending is aborted, not that the request is gone. [M]
             plan.clear();
         }
-        if self.link.fault.is_some() {
+        if self.link.fault.is_some() || self.is_off_rate() {
             self.begin_attempt(plan.first().copied());
             plan.clear();
         }
@@ -158,6 +162,11 @@ impl Controller {
             self.link.events.push(WireEvent::Offer { at: self.now, buffer, frame });
         }
         takes_back
+    }
+
+    /// The bits of this controller are not those of the bus.
+    fn is_off_rate(&self) -> bool {
+        self.timing().is_some_and(|timing| timing.bits_per_second().abs_diff(BUS_HZ) > OFF_HZ)
     }
 
     /// Restricted operation: receives and acknowledges, sends nothing, counts no errors.
@@ -271,6 +280,7 @@ impl Controller {
         let (error, bits) = match self.link.fault {
             Some(Fault::NoAcknowledge) => (BusError::Acknowledge, frame.stuffed_bits() + TO_ACKNOWLEDGE_BITS),
             Some(Fault::BitErrors { .. }) => (BusError::Bit0, TO_DISTURBED_BIT),
+            None if self.is_off_rate() => (BusError::Bit0, TO_DISTURBED_BIT),
             Some(Fault::StuckDominant) | None => return,
         };
         let passive = if self.errors.is_passive() { SUSPENSION_BITS } else { 0 };
@@ -320,6 +330,9 @@ impl Controller {
         let start =
             self.timing().map_or(0, |timing| self.now.saturating_sub(timing.bits(frame.bits() - INTERMISSION_BITS)));
         let is_stuck = self.link.fault == Some(Fault::StuckDominant);
+        if self.is_off_rate() {
+            return self.receive_failed(BusError::Form);
+        }
         match self.bus {
             Bus::Active { since } if since <= start && !is_stuck => self.store(memory, frame),
             Bus::Stopped => {}

@@ -2,6 +2,7 @@
 
 mod bench;
 mod cancellation;
+mod disturbed;
 mod errors;
 mod filters;
 mod frames;

@@ -42,6 +42,9 @@ impl BitTiming {
 /// samples elsewhere works on a short bus and fails on a long one.
 pub const BIT_TIMING: BitTiming = BitTiming { prescaler: 10, before_sample: 5, after_sample: 2, jump: 1 };
 
+/// The same from the 40 MHz that the chip's own oscillator makes.
+pub const BIT_TIMING_OF_HSI: BitTiming = BitTiming { prescaler: 5, ..BIT_TIMING };
+
 /// Bits per second of both buses.
 pub const BITS_PER_SECOND: u32 = 1_000_000;
 

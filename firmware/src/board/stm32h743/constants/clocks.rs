@@ -18,6 +18,10 @@ pub const HSI_HZ: u32 = 64_000_000;
 /// Longest wait for HSE before the light begins to blink, us: a clock that is there is ready within microseconds.
 pub const HSE_SOON_US: u32 = 2_000;
 
+/// Longest further wait before motors are told by the chip's own oscillator to let go, us: a crystal oscillator, which
+/// this board has not, would be ready by then.
+pub const HSE_LATE_US: u32 = 2_000;
+
 /// Half a period of that blinking, us: 10 Hz, which nobody takes for the steady light of torque.
 pub const HSE_BLINK_US: u32 = 50_000;
 
@@ -62,6 +66,13 @@ pub const PLL1: PhaseLockedLoop = PhaseLockedLoop { input_divider: 1, multiplier
 
 /// USB and the serial line.
 pub const PLL3: PhaseLockedLoop = PhaseLockedLoop { input_divider: 1, multiplier: 96, p: None, q: Some(16) };
+
+/// Clock of the CAN controller when the 8 MHz have failed, from the chip's own oscillator: 64 / 8 × 40 / 8 = 40 MHz,
+/// below the bus clock, which is that oscillator's then.
+pub const PLL1_OF_HSI: PhaseLockedLoop = PhaseLockedLoop { input_divider: 8, multiplier: 40, p: None, q: Some(8) };
+
+/// Longest wait for that loop to lock, us: ten times what the maker gives.
+pub const LOCK_US: u32 = 1_000;
 
 /// The divided output, Hz; 0 where the output is off.
 const fn output(pll: &PhaseLockedLoop, divider: Option<u32>) -> u32 {

@@ -5,6 +5,8 @@
 //! manual UM2407 of the NUCLEO-H743ZI2. `docs/board-stm32h743.md` explains why each number is what it is.
 
 pub mod can;
+pub mod can_settings;
+pub mod chip_settings;
 pub mod clocks;
 pub mod filters;
 pub mod lines;

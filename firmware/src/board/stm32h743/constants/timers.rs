@@ -50,5 +50,6 @@ pub const LAST_ROOM_US: u32 = 1_500;
 pub const INIT_US: u32 = 20;
 
 /// At the end, the longest wait for the last frames to leave, us: either the bus has to be joined again, which takes
-/// 129 times eleven bits, or a frame of another node and four that waited come first.
-pub const LAST_LEFT_US: u32 = 3_000;
+/// 129 times eleven bits and may begin only when the controller has come to bus-off over them, or a frame of another
+/// node and four that waited come first. With the wait for room it stays below the watchdog's shortest window.
+pub const LAST_LEFT_US: u32 = 5_000;

@@ -59,7 +59,8 @@ pub(super) fn now() -> u64 {
 }
 
 /// Asks until it is so, for at most this long; tells whether it was. Works with interrupts masked, once [`start`] has
-/// run.
+/// run. It ends as well where the counter stands still: a question takes longer than a tick, so there are no more
+/// questions than ticks.
 pub(super) fn within(us: u32, is_so: impl FnMut() -> bool) -> bool {
     within_ticks(us * (TICKS_PER_US as u32), is_so)
 }
@@ -71,12 +72,13 @@ pub(super) fn within_early(us: u32, is_so: impl FnMut() -> bool) -> bool {
 
 fn within_ticks(limit: u32, mut is_so: impl FnMut() -> bool) -> bool {
     let begin = TIM5.cnt().read();
-    loop {
+    for _ in 0..=limit {
         if is_so() {
             return true;
         }
         if TIM5.cnt().read().wrapping_sub(begin) >= limit {
-            return false;
+            break;
         }
     }
+    false
 }

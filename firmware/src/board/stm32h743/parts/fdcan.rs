@@ -12,6 +12,9 @@
 //! for 129 times eleven recessive bits (1.4 ms). That motion does not resume is the application's business
 //! ([`CanStatus::bus_offs`]).
 //!
+//! A controller is brought back with all its settings. They are compared with what was written, one word at a time,
+//! whenever the processor has nothing else to do ([`Controller::look`]).
+//!
 //! The two interrupt flags tell it at once. The mode is read once a control cycle as well ([`CanStatus::tend`]): INIT
 //! goes from one clock domain to the other and may be read later than the flag of bus-off, and a mode without a flag is
 //! seen too.
@@ -21,12 +24,12 @@ use core::convert::Infallible;
 use cortex_m::peripheral::NVIC;
 use embassy_stm32::pac::can::Fdcan;
 use embassy_stm32::pac::can::regs::{Cccr, Ir, Txbar};
-use embassy_stm32::pac::can::vals::Tfqm;
 use embassy_stm32::pac::{FDCAN1, FDCAN2, FDCANRAM, RCC};
 use embedded_can::{Frame as _, Id};
 use puck::{CanFrame, CanId};
 
-use super::super::constants::can::{ARM, BIT_TIMING, ELEMENT_WORDS, HOST, MODE_BITS, MessageMemory};
+use super::super::constants::can::{ARM, BIT_TIMING, BIT_TIMING_OF_HSI, ELEMENT_WORDS, HOST, MODE_BITS, MessageMemory};
+use super::super::constants::can_settings::{ARM_INTERRUPTS, SETTINGS, Setting, settings};
 use super::super::constants::filters::{ARM_FILTERS, HOST_FILTERS};
 use super::super::constants::timers::{INIT_US, LAST_LEFT_US, LAST_ROOM_US};
 use super::SelectedBoard;
@@ -37,15 +40,19 @@ use crate::board::{CanStatus, panic_stop};
 /// Logical priority of the answer to "a frame has left": above every task, it takes a dozen instructions.
 const SENT_PRIORITY: u8 = 14;
 
-/// Reject what matches no filter.
-const REJECT: u8 = 0b10;
-
 /// Where the identifier stands in the first word of an element.
 const ID_SHIFT: u32 = 18;
 /// First word: the identifier has 29 bits.
 const EXTENDED: u32 = 1 << 30;
 /// First word: a remote frame.
 const REMOTE: u32 = 1 << 29;
+/// An identifier that no frame of eleven bits has.
+const NO_ID: u16 = 0x800;
+/// Frames in a row that both queues may bring: twice what the longer one holds.
+const MOST_IN_A_ROW: u8 = 128;
+/// Most calls for a frame in a control cycle: the shortest frames are 71, and each may come with an interrupt of its
+/// own, which asks once in vain. Line 0 stands above the session, and if it stayed up nobody could stop the arm.
+const MOST_ANSWERS: u8 = 240;
 /// Where the length stands in the second word.
 const LENGTH_SHIFT: u32 = 16;
 
@@ -53,63 +60,72 @@ const LENGTH_SHIFT: u32 = 16;
 pub(super) struct Controller {
     registers: Fdcan,
     memory: MessageMemory,
+    set: &'static Set,
 }
 
+/// All that a controller is told.
+struct Set {
+    registers: [Setting; SETTINGS],
+    filters: &'static [u32],
+}
+
+static ARM_SET: Set = Set { registers: settings(&ARM, &BIT_TIMING, ARM_INTERRUPTS), filters: &ARM_FILTERS };
+static OWN_OSCILLATOR_SET: Set = Set { registers: settings(&ARM, &BIT_TIMING_OF_HSI, 0), filters: &ARM_FILTERS };
+static HOST_SET: Set = Set { registers: settings(&HOST, &BIT_TIMING, 0), filters: &HOST_FILTERS };
+
 /// The controller of the arm's bus.
-const ARM_CONTROLLER: Controller = Controller { registers: FDCAN1, memory: ARM };
+pub(super) const ARM_CONTROLLER: Controller = Controller { registers: FDCAN1, memory: ARM, set: &ARM_SET };
 /// The controller of the host's bus.
-pub(super) const HOST_CONTROLLER: Controller = Controller { registers: FDCAN2, memory: HOST };
+pub(super) const HOST_CONTROLLER: Controller = Controller { registers: FDCAN2, memory: HOST, set: &HOST_SET };
 
 impl Controller {
-    /// Bit timing, filters, queues, no interrupts; then onto the bus.
-    fn start(&self, filters: &[u32]) {
-        let r = self.registers;
+    /// Everything that is set, with the configuration left open.
+    fn start(&self) {
         if !self.stop() {
             panic_stop::stop::<SelectedBoard>(format_args!("a CAN controller does not stop: it has no clock"));
         }
         self.configure();
-        r.nbtp().write(|w| {
-            w.set_nbrp((BIT_TIMING.prescaler - 1) as u16);
-            w.set_ntseg1((BIT_TIMING.before_sample - 1) as u8);
-            w.set_ntseg2((BIT_TIMING.after_sample - 1) as u8);
-            w.set_nsjw((BIT_TIMING.jump - 1) as u8);
-        });
         // The message memory starts with random content, check bits included.
         for word in self.memory.filters_at..self.memory.end() {
             FDCANRAM.ram(word as usize).write_value(0);
         }
-        for (index, filter) in filters.iter().enumerate() {
-            FDCANRAM.ram(self.memory.filters_at as usize + index).write_value(*filter);
+        self.set_up();
+        self.registers.ir().write_value(Ir(u32::MAX));
+    }
+
+    /// Writes every setting and filter. Only while the configuration is open.
+    fn set_up(&self) {
+        for setting in &self.set.registers {
+            // SAFETY: a register of this controller, see `register`; the value is one that its field allows.
+            unsafe { self.register(setting.offset).write_volatile(setting.value) };
         }
-        r.gfc().write(|w| {
-            w.set_anfs(REJECT);
-            w.set_anfe(REJECT);
-            w.set_rrfs(true);
-            w.set_rrfe(true);
-        });
-        r.sidfc().write(|w| {
-            w.set_flssa(self.memory.filters_at as u16);
-            w.set_lss(self.memory.filters as u8);
-        });
-        r.xidfc().write(|w| w.set_lse(0));
-        r.rxfc(0).write(|w| {
-            w.set_fsa(self.memory.receive_at as u16);
-            w.set_fs(self.memory.receive as u8);
-            // A full queue keeps what it has: the oldest reply belongs to the oldest question.
-            w.set_fom(false);
-        });
-        r.rxfc(1).write(|w| w.set_fs(0));
-        r.rxesc().write(|_| {});
-        r.txesc().write(|_| {});
-        r.txefc().write(|_| {});
-        r.txbc().write(|w| {
-            w.set_tbsa(self.memory.transmit_at as u16);
-            w.set_tfqs(self.memory.transmit as u8);
-            // First in, first out: the order in which the application hands frames over is part of the protocol.
-            w.set_tfqm(Tfqm::FIFO);
-        });
-        r.ie().write(|_| {});
-        r.ir().write_value(Ir(u32::MAX));
+        for (filter, word) in self.set.filters.iter().zip(self.memory.filters_at as usize..) {
+            FDCANRAM.ram(word).write_value(*filter);
+        }
+    }
+
+    /// The register at an offset of [`settings`].
+    fn register(&self, offset: u32) -> *mut u32 {
+        self.registers.as_ptr().cast::<u32>().wrapping_byte_add(offset as usize)
+    }
+
+    /// Compares one setting or filter with what was written, the next one at the next `turn`. Where a bit has fallen
+    /// over, the controller is taken off the bus: whoever tends it brings it back, and that writes all of them anew.
+    pub(super) fn look(&self, turn: usize) {
+        let turn = turn.checked_rem(SETTINGS + self.set.filters.len()).unwrap_or(0);
+        let filter = turn.saturating_sub(SETTINGS);
+        let is_as_written = || match (self.set.registers.get(turn), self.set.filters.get(filter)) {
+            // SAFETY: a register of this controller that reading does not change, see `register`.
+            (Some(setting), _) => unsafe { self.register(setting.offset).read_volatile() == setting.value },
+            (None, Some(value)) => FDCANRAM.ram(self.memory.filters_at as usize + filter).read() == *value,
+            (None, None) => true,
+        };
+        // One that is not there, or away already, is set up when it comes. What is read wrong once is not wrong.
+        if !self.takes_part() || is_as_written() || is_as_written() {
+            return;
+        }
+        defmt::error!("a setting of a CAN controller had changed, number {=usize}: all are written again", turn);
+        critical_section::with(|_| self.registers.cccr().modify(|w| w.set_init(true)));
     }
 
     /// Takes the controller off the bus, if it is on it. Tells whether it has stopped: the bit goes through another
@@ -172,26 +188,27 @@ impl Controller {
         true
     }
 
-    /// Takes the oldest received frame: identifier, length, data.
-    pub(super) fn fetch(&self) -> Option<(u16, usize, [u8; 8])> {
-        loop {
-            let queue = self.registers.rxfs(0).read();
-            if queue.ffl() == 0 {
-                return None;
-            }
-            let place = queue.fgi();
-            let at = (self.memory.receive_at + u32::from(place) * ELEMENT_WORDS) as usize;
-            let head = FDCANRAM.ram(at).read();
-            let length = (FDCANRAM.ram(at + 1).read() >> LENGTH_SHIFT & 0xF) as usize;
-            let [a, b, c, d] = FDCANRAM.ram(at + 2).read().to_le_bytes();
-            let [e, f, g, h] = FDCANRAM.ram(at + 3).read().to_le_bytes();
-            self.registers.rxfa(0).write(|w| w.set_fai(place));
-            // The filters let neither through; a controller that does must not confuse the arm.
-            if head & (EXTENDED | REMOTE) != 0 {
-                continue;
-            }
-            return Some(((head >> ID_SHIFT & 0x7FF) as u16, length.min(8), [a, b, c, d, e, f, g, h]));
+    /// Takes the oldest received frame: identifier, length, data; none as well if there have been too many in a `row`.
+    pub(super) fn fetch(&self, row: &mut Row) -> Option<(u16, usize, [u8; 8])> {
+        let queue = self.registers.rxfs(0).read();
+        if queue.ffl() == 0 {
+            *row = Row::NONE;
+            return None;
         }
+        if row.is_endless() {
+            return None;
+        }
+        row.0 += 1;
+        let place = queue.fgi();
+        let at = (self.memory.receive_at + u32::from(place) * ELEMENT_WORDS) as usize;
+        let head = FDCANRAM.ram(at).read();
+        let length = (FDCANRAM.ram(at + 1).read() >> LENGTH_SHIFT & 0xF) as usize;
+        let [a, b, c, d] = FDCANRAM.ram(at + 2).read().to_le_bytes();
+        let [e, f, g, h] = FDCANRAM.ram(at + 3).read().to_le_bytes();
+        self.registers.rxfa(0).write(|w| w.set_fai(place));
+        // The filters let neither through; a controller that does must not confuse the arm.
+        let id = if head & (EXTENDED | REMOTE) == 0 { (head >> ID_SHIFT & 0x7FF) as u16 } else { NO_ID };
+        Some((id, length.min(8), [a, b, c, d, e, f, g, h]))
     }
 
     /// Frames that have not been on the wire yet.
@@ -208,7 +225,7 @@ impl Controller {
     /// does not leave, and this wants to be called again.
     #[cold]
     #[inline(never)]
-    fn bring_back(&self) -> bool {
+    pub(super) fn bring_back(&self) -> bool {
         self.stop() && self.forget_and_join()
     }
 
@@ -223,37 +240,43 @@ impl Controller {
     ///
     /// Not by cancelling: that is for dedicated buffers and queues, and the controller's manual does not say that its
     /// FIFO skips a cancelled frame. Opening the configuration (CCE) makes the controller forget what waits and what it
-    /// has received (TXBRP, TXFQS, RXF0S) and keeps its settings.
+    /// has received (TXBRP, TXFQS, RXF0S). Its settings it would keep; they are written again all the same, because one
+    /// in which a bit has fallen over may be what has brought it here.
     fn forget_and_join(&self) -> bool {
         self.configure();
+        self.set_up();
         self.join()
     }
 }
 
-/// Starts the arm's controller and lets it interrupt, and the host's if the chip bears both.
-pub(super) fn start(nvic: &mut NVIC, host: bool) {
+/// Frames fetched since a queue was last empty.
+pub(super) struct Row(u8);
+
+impl Row {
+    /// It is empty.
+    pub(super) const NONE: Self = Self(0);
+
+    /// True if there were more than a queue holds and a bus brings meanwhile: the controller hands out the same frame
+    /// again and again. Whoever fetches would do so for ever, and those below would never have their turn.
+    pub(super) fn is_endless(&self) -> bool {
+        self.0 >= MOST_IN_A_ROW
+    }
+}
+
+/// Gives both controllers their clock, and resets them.
+fn clock_and_reset() {
     RCC.apb1henr().modify(|w| w.set_fdcanen(true));
     RCC.apb1hrstr().modify(|w| w.set_fdcanrst(true));
     RCC.apb1hrstr().modify(|w| w.set_fdcanrst(false));
-    ARM_CONTROLLER.start(&ARM_FILTERS);
-    let r = ARM_CONTROLLER.registers;
-    r.ie().write(|w| {
-        w.set_rfne(0, true);
-        w.set_rfle(0, true);
-        w.set_boe(true);
-        w.set_mrafe(true);
-        w.set_tce(true);
-    });
-    r.ils().write(|w| w.set_tcl(true));
-    // A frame's departure is told only for the places that ask for it.
-    r.txbtie().write(|w| w.0 = u32::MAX);
-    r.ile().write(|w| {
-        w.set_eint0(true);
-        w.set_eint1(true);
-    });
+}
+
+/// Starts the arm's controller and lets it interrupt, and the host's if the chip bears both.
+pub(super) fn start(nvic: &mut NVIC, host: bool) {
+    clock_and_reset();
+    ARM_CONTROLLER.start();
     ARM_CONTROLLER.join();
     if host {
-        HOST_CONTROLLER.start(&HOST_FILTERS);
+        HOST_CONTROLLER.start();
         HOST_CONTROLLER.join();
     }
     // SAFETY: the handler below clears one flag and pends one line; it shares nothing with anybody.
@@ -276,6 +299,9 @@ extern "C" fn FDCAN1_IT1() {
 pub struct ArmBus {
     overruns: u32,
     bus_offs: u32,
+    row: Row,
+    /// Calls for a frame since the controller was tended.
+    answers: u8,
     /// The controller does not take part, and has not come back yet.
     is_away: bool,
 }
@@ -283,7 +309,7 @@ pub struct ArmBus {
 impl ArmBus {
     /// The one there is; called once.
     pub(super) const fn take() -> Self {
-        Self { overruns: 0, bus_offs: 0, is_away: false }
+        Self { overruns: 0, bus_offs: 0, row: Row::NONE, answers: 0, is_away: false }
     }
 
     /// Answers the flags of line 0.
@@ -352,8 +378,18 @@ impl embedded_can::nb::Can for ArmBus {
 
     fn receive(&mut self) -> nb::Result<CanFrame, Infallible> {
         self.answer();
+        self.answers = self.answers.saturating_add(1);
+        if self.answers == MOST_ANSWERS {
+            NVIC::mask(Chip::FDCAN1_IT0);
+        }
         loop {
-            let (id, length, data) = ARM_CONTROLLER.fetch().ok_or(nb::Error::WouldBlock)?;
+            let Some((id, length, data)) = ARM_CONTROLLER.fetch(&mut self.row) else {
+                if self.row.is_endless() {
+                    self.row = Row::NONE;
+                    self.bring_back();
+                }
+                return Err(nb::Error::WouldBlock);
+            };
             let frame = CanId::new(id).and_then(|id| CanFrame::from_slice(id, data.get(..length)?));
             if let Some(frame) = frame {
                 return Ok(frame);
@@ -364,9 +400,14 @@ impl embedded_can::nb::Can for ArmBus {
 
 impl CanStatus for ArmBus {
     fn tend(&mut self) {
-        if self.is_away || !ARM_CONTROLLER.takes_part() {
+        let is_held = self.answers >= MOST_ANSWERS;
+        self.answers = 0;
+        if self.is_away || is_held || !ARM_CONTROLLER.takes_part() {
             self.bring_back();
         }
+        // Also where a bit of the interrupt controller has fallen over.
+        // SAFETY: the task of this line is the application's, and was let in before the first slot.
+        unsafe { NVIC::unmask(Chip::FDCAN1_IT0) };
     }
 
     fn waiting(&self) -> usize {
@@ -382,6 +423,17 @@ impl CanStatus for ArmBus {
     }
 }
 
+/// Sends these frames by the clock that the chip's own oscillator makes, as far as the bus understands them.
+pub(super) fn send_by_own_oscillator(frames: &[CanFrame]) {
+    clock_and_reset();
+    let controller = Controller { registers: FDCAN1, memory: ARM, set: &OWN_OSCILLATOR_SET };
+    controller.start();
+    controller.join();
+    send_last(frames);
+    clock::within_early(LAST_LEFT_US, || controller.waiting() == 0);
+    controller.stop();
+}
+
 /// The end: hands these frames over behind what waits, of which there is less than a millisecond. Only if the queue
 /// does not move, or the controller has left the bus, what waits is thrown away.
 pub(super) fn hand_over_last(frames: &[CanFrame]) {
@@ -389,7 +441,9 @@ pub(super) fn hand_over_last(frames: &[CanFrame]) {
         return;
     }
     let controller = &ARM_CONTROLLER;
-    if !(controller.takes_part() && clock::within(LAST_ROOM_US, || controller.room() >= frames.len())) {
+    // INIT may be read later than bus-off: what is handed over before that is lost when the controller comes back.
+    let is_on = controller.takes_part() && !controller.registers.psr().read().bo();
+    if !(is_on && clock::within(LAST_ROOM_US, || controller.room() >= frames.len())) {
         // If it does not stop or does not come back there is nothing left to try.
         let _ = controller.bring_back();
     }

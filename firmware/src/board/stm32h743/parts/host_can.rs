@@ -9,7 +9,7 @@ use link::can::{Direction, Reassembler, SEGMENT_BYTES, Segmenter};
 
 use super::super::constants::filters::HOST_DEVICE;
 use super::super::constants::lines::TRANSMIT_BYTES;
-use super::fdcan::HOST_CONTROLLER;
+use super::fdcan::{HOST_CONTROLLER, Row};
 use crate::board::LinkPort;
 
 /// The line as the selector sees it.
@@ -19,6 +19,7 @@ pub struct HostCan {
     segmenter: Segmenter,
     reassembler: Reassembler,
     to_send: Deque<u8, TRANSMIT_BYTES>,
+    row: Row,
 }
 
 impl HostCan {
@@ -29,6 +30,7 @@ impl HostCan {
             segmenter: Segmenter::new(Direction::ToHost, HOST_DEVICE),
             reassembler: Reassembler::new(Direction::ToDevice, HOST_DEVICE),
             to_send: Deque::new(),
+            row: Row::NONE,
         }
     }
 
@@ -61,12 +63,16 @@ impl LinkPort for HostCan {
         let mut count = 0;
         // A segment is taken only if all it may bring fits: a segment and the mark of a loss before it.
         while buffer.len() - count > SEGMENT_BYTES {
-            let Some((id, length, data)) = HOST_CONTROLLER.fetch() else { break };
+            let Some((id, length, data)) = HOST_CONTROLLER.fetch(&mut self.row) else { break };
             let piece = self.reassembler.take(id, data.get(..length).unwrap_or(&[]));
             for (place, byte) in buffer.iter_mut().skip(count).zip(piece.iter()) {
                 *place = *byte;
                 count += 1;
             }
+        }
+        if self.row.is_endless() {
+            self.row = Row::NONE;
+            HOST_CONTROLLER.bring_back();
         }
         count
     }

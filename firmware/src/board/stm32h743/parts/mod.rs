@@ -9,12 +9,14 @@ mod flash;
 mod host_can;
 mod light;
 mod logger;
+mod own_oscillator;
 mod panic_reason;
 mod pins;
 mod port;
 mod protection;
 mod reset;
 mod serial_number;
+mod settings;
 mod slot_timer;
 mod supply;
 mod tree;
@@ -57,7 +59,7 @@ impl crate::board::Board for SelectedBoard {
         let cause = reset::take_cause();
         protection::start(&mut core);
         clock::start();
-        crystal::wait();
+        crystal::wait(cause.from_service);
         let peripherals: Peripherals = embassy_stm32::init(tree::config());
         tree::repair();
         clock::start();
@@ -81,7 +83,7 @@ impl crate::board::Board for SelectedBoard {
         uart::start(&mut core.NVIC);
         let serial = serial_number::read();
         usb::start(&mut core.NVIC, serial);
-        defmt::info!("reset by {=str}", cause);
+        defmt::info!("reset by {=str}", cause.words);
         panic_reason::tell();
         supply::tell();
         if !host_bus {
@@ -109,6 +111,7 @@ impl crate::board::Board for SelectedBoard {
     }
 
     fn sleep() {
+        settings::look();
         cortex_m::asm::wfi();
     }
 

@@ -1,7 +1,8 @@
 //! The reason of the last stop, kept in memory that a restart does not clear, and told after it.
 //!
 //! The record lies in tightly coupled memory: no cache holds any of it back when the chip restarts. It counts only if
-//! its mark and its check sum are right, so what the memory holds after power came is never taken for words.
+//! its mark is right but for a bit or two, which memory holds by chance once in ten million times after power came.
+//! Words whose check sum is wrong are told as such: what is still readable of a reason is worth more than nothing.
 
 use core::cell::UnsafeCell;
 use core::fmt::{self, Write};
@@ -14,6 +15,9 @@ const WORDS_BYTES: usize = 500;
 
 /// First word of a record, so that random memory is refused before its length is believed.
 const MAGIC: u32 = 0x5441_4354;
+
+/// Bits of it that may have fallen over.
+const FALLEN_BITS: u32 = 2;
 
 #[repr(C)]
 struct Record {
@@ -70,16 +74,15 @@ pub(super) fn write(reason: fmt::Arguments<'_>) {
 pub(super) fn tell() {
     let record = PLACE.0.get().cast::<Record>();
     // SAFETY: see `Place`; every bit pattern is a record, and all of its memory exists.
-    let found = unsafe { record.read_volatile() };
+    let mut found = unsafe { record.read_volatile() };
     // SAFETY: as above.
     unsafe { (&raw mut (*record).magic).write_volatile(0) };
-    if found.magic != MAGIC {
+    if (found.magic ^ MAGIC).count_ones() > FALLEN_BITS {
         return;
     }
-    let Some(words) = found.words.get(..found.length as usize) else { return };
-    if CRC.checksum(words) != found.crc {
-        return;
-    }
+    let Some(words) = found.words.get(..found.length as usize).filter(|words| CRC.checksum(words) == found.crc) else {
+        return tell_damaged(&mut found);
+    };
     match core::str::from_utf8(words) {
         Ok(words) => defmt::error!("before this start: {=str}", words),
         // A reason that was cut inside a letter.
@@ -88,4 +91,17 @@ pub(super) fn tell() {
             defmt::error!("before this start: {=str}...", whole.unwrap_or(""));
         }
     }
+}
+
+/// Tells the words of a record in which bits have fallen over, as far as they are letters.
+#[cold]
+#[inline(never)]
+fn tell_damaged(found: &mut Record) {
+    let length = (found.length as usize).min(WORDS_BYTES);
+    let words = found.words.get_mut(..length).unwrap_or_default();
+    for byte in words.iter_mut().filter(|byte| !(b' '..=b'~').contains(*byte)) {
+        *byte = b'?';
+    }
+    let words = core::str::from_utf8(words).unwrap_or("");
+    defmt::error!("before this start, not as it was written: {=str}", words);
 }

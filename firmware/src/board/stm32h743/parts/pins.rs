@@ -5,7 +5,7 @@ use embassy_stm32::gpio::{AfType, Flex, OutputType, Pin, Pull, Speed};
 use embassy_stm32::peripherals::{PA11, PA12, PB5, PB6, PD0, PD1, PD8, PD9};
 
 /// Alternate function of the CAN controllers on these pins.
-const CAN: u8 = 9;
+pub(super) const CAN: u8 = 9;
 /// Alternate function of USART3 on these pins.
 const UART: u8 = 7;
 /// Alternate function of the USB device on these pins.

@@ -22,6 +22,8 @@ pub(super) enum Phase {
     Service = 0x5441_0003,
     /// The last words are told and a restart was asked for.
     End = 0x5441_0004,
+    /// The 8 MHz are waited for, and the bus was told so if anybody can have been left with a torque.
+    Waiting = 0x5441_0005,
 }
 
 struct Place(UnsafeCell<MaybeUninit<u32>>);
@@ -39,33 +41,51 @@ pub(super) fn enter(phase: Phase) {
     unsafe { PHASE.0.get().cast::<u32>().write_volatile(phase as u32) };
 }
 
+/// The phase in the memory, or whatever the memory holds.
+fn phase() -> u32 {
+    // SAFETY: see `Place`; every bit pattern is a number.
+    unsafe { PHASE.0.get().cast::<u32>().read_volatile() }
+}
+
 /// Restarts the chip, so that the next start knows that the image wanted it.
 pub(super) fn restart() -> ! {
-    enter(Phase::End);
+    if phase() != Phase::Waiting as u32 {
+        enter(Phase::End);
+    }
     cortex_m::asm::dsb();
     SCB::sys_reset()
 }
 
-/// Takes what made the chip start, for people, and begins the first phase. Called first of all, once.
-pub(super) fn take_cause() -> &'static str {
-    // SAFETY: see `Place`; every bit pattern is a number.
-    let phase = unsafe { PHASE.0.get().cast::<u32>().read_volatile() };
+/// The cause of a start.
+pub(super) struct Cause {
+    /// For people.
+    pub(super) words: &'static str,
+    /// Power has been there all the time, and the image was in service or at its end: a motor may hold a torque.
+    pub(super) from_service: bool,
+}
+
+/// Takes what made the chip start, and begins the first phase. Called first of all, once.
+pub(super) fn take_cause() -> Cause {
+    let phase = phase();
     enter(Phase::Clocks);
     let flags = RCC.rsr().read();
     // So that the next start tells its own.
     RCC.rsr().modify(|w| w.set_rmvf(true));
     // Every reset also pulls the reset pin, and power also reports brown-out: the most telling cause first.
-    if flags.iwdg1rstf() || flags.wwdg1rstf() {
+    let has_power = !(flags.porrstf() || flags.borrstf());
+    let from_service = has_power && (phase == Phase::Service as u32 || phase == Phase::End as u32);
+    let words = if flags.iwdg1rstf() || flags.wwdg1rstf() {
         by_watchdog(phase)
     } else if flags.sftrstf() {
-        if phase == Phase::End as u32 { "the image itself" } else { "a debug probe" }
+        if phase == Phase::End as u32 || phase == Phase::Waiting as u32 { "the image itself" } else { "a debug probe" }
     } else if flags.porrstf() || flags.borrstf() {
         "power"
     } else if flags.pinrstf() {
         "the reset pin: button or debug probe"
     } else {
         "an unknown cause"
-    }
+    };
+    Cause { words, from_service }
 }
 
 /// Where the watchdog met the image.

@@ -2,6 +2,10 @@
 //!
 //! The controller holds 16 bytes in each direction, 174 us of a full line, so its interrupt stands above every task and
 //! does nothing but move bytes between those and two queues.
+//!
+//! Above every task: a controller whose line would not come down would keep the control slot from its turn. So it moves
+//! no more bytes in one go than the controller holds, and it gives way until the session comes by when nobody fetches
+//! what has come, or after so many turns in which there was nothing to move.
 
 use core::cell::RefCell;
 
@@ -12,7 +16,7 @@ use embassy_stm32::pac::usart::vals::Over8;
 use embassy_stm32::pac::{self, RCC};
 use heapless::Deque;
 
-use super::super::constants::lines::{RECEIVE_BYTES, TRANSMIT_BYTES, UART_BRR, UART_EIGHT_SAMPLES};
+use super::super::constants::lines::{RECEIVE_BYTES, TRANSMIT_BYTES, UART_BRR, UART_EIGHT_SAMPLES, UART_FIFO_BYTES};
 use super::device::{Chip, level};
 use crate::board::LinkPort;
 
@@ -28,14 +32,19 @@ const SILENCE_BITS: u32 = 40;
 /// Bytes moved with interrupts masked in one go: 0.2 us of copying.
 const PORTION: usize = 32;
 
+/// Interrupts with nothing to move between two visits of the session, which comes by every 1.1 ms: a silence makes one.
+const TURNS: u32 = 64;
+
 /// The queues between the interrupt and the session.
 struct Queues {
     received: Deque<u8, RECEIVE_BYTES>,
     to_send: Deque<u8, TRANSMIT_BYTES>,
+    /// Of [`TURNS`].
+    turns_left: u32,
 }
 
 static QUEUES: Mutex<RefCell<Queues>> =
-    Mutex::new(RefCell::new(Queues { received: Deque::new(), to_send: Deque::new() }));
+    Mutex::new(RefCell::new(Queues { received: Deque::new(), to_send: Deque::new(), turns_left: TURNS }));
 
 fn with<T>(action: impl FnOnce(&mut Queues) -> T) -> T {
     critical_section::with(|section| action(&mut QUEUES.borrow_ref_mut(section)))
@@ -75,11 +84,16 @@ pub(super) fn start(nvic: &mut NVIC) {
 #[unsafe(no_mangle)]
 extern "C" fn USART3() {
     let r = pac::USART3;
-    with(|queues| {
-        while r.isr().read().rxne() {
+    let gives_way = with(|queues| {
+        let mut moved = false;
+        for _ in 0..UART_FIFO_BYTES {
+            if !r.isr().read().rxne() {
+                break;
+            }
             let byte = r.rdr().read().dr() as u8;
             // Without room the byte is lost: see `LinkPort::read`.
             let _ = queues.received.push_back(byte);
+            moved = true;
         }
         let mut seen = Icr(0);
         seen.set_rtof(true);
@@ -88,7 +102,10 @@ extern "C" fn USART3() {
         seen.set_ne(true);
         seen.set_pe(true);
         r.icr().write_value(seen);
-        while r.isr().read().txe() {
+        for _ in 0..UART_FIFO_BYTES {
+            if !r.isr().read().txe() {
+                break;
+            }
             match queues.to_send.pop_front() {
                 Some(byte) => r.tdr().write(|w| w.set_dr(u16::from(byte))),
                 None => {
@@ -96,8 +113,14 @@ extern "C" fn USART3() {
                     break;
                 }
             }
+            moved = true;
         }
+        queues.turns_left -= u32::from(!moved && queues.turns_left > 0);
+        queues.received.is_full() || queues.turns_left == 0
     });
+    if gives_way {
+        NVIC::mask(Chip::USART3);
+    }
 }
 
 /// The line as the selector sees it.
@@ -115,10 +138,16 @@ impl LinkPort for Serial {
                     *place = byte;
                     found += 1;
                 }
+                if found < wanted {
+                    queues.turns_left = TURNS;
+                }
                 found
             });
             count += found;
             if found < wanted {
+                // All there was is fetched. Not before: bytes without end would keep the session here.
+                // SAFETY: as in `start`.
+                unsafe { NVIC::unmask(Chip::USART3) };
                 break;
             }
         }

@@ -6,6 +6,10 @@
 //! The controller holds its line up for as long as it keeps a packet that nobody takes, and this interrupt stands
 //! above the session, which alone makes room. So it gives way when the queue is full, and after so many turns in any
 //! case; the session lets it in again at every visit.
+//!
+//! The driver empties queues of the controller when the bus was reset and when a question comes before the last answer
+//! has left. It waits for that with interrupts masked and without a bound, and a control slot behind it. So what it is
+//! about to empty is emptied here first: a controller that does not end this is not touched any more.
 
 use core::cell::{RefCell, UnsafeCell};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -48,6 +52,33 @@ const READY_US: u32 = 1_000;
 const RESET: *mut u32 = 0x4008_0010 as *mut u32;
 const CORE_RESET: u32 = 1;
 const IDLE: u32 = 1 << 31;
+/// Its bits that empty the receive queue and a transmit queue, the number of the latter, and that of all of them.
+const EMPTY_RECEIVE: u32 = 1 << 4;
+const EMPTY_TRANSMIT: u32 = 1 << 5;
+const QUEUE_NUMBER: u32 = 0x1F << 6;
+const EVERY_QUEUE: u32 = 0x10 << 6;
+
+/// Longest wait for empty queues, us: the controller needs some ticks of its transceiver's clock.
+const EMPTY_US: u32 = 50;
+
+/// The status register (GINTSTS) and its bits: a packet was received, the bus was reset, its speed is known.
+const STATUS: *const u32 = 0x4008_0014 as *const u32;
+const RECEIVED: u32 = 1 << 4;
+const BUS_RESET: u32 = 1 << 12;
+const SPEED_KNOWN: u32 = 1 << 13;
+
+/// The packet that was received (GRXSTSR), where its kind stands, and that of a question (SETUP).
+const HEAD: *const u32 = 0x4008_001C as *const u32;
+const KIND_SHIFT: u32 = 17;
+const QUESTION: u32 = 0b0110;
+
+/// The size of the control endpoint's answer (DIEPTSIZ0), and its bits that count packets not sent yet.
+const ANSWER: *const u32 = 0x4008_0910 as *const u32;
+const NOT_SENT: u32 = 0b11 << 19;
+
+/// The device's status (DSTS), where its speed stands, and the one that the driver panics at: there is none.
+const DEVICE_STATUS: *const u32 = 0x4008_0808 as *const u32;
+const NO_SPEED: u32 = 0b10;
 
 /// The chip's second USB controller, on PA11 and PA12.
 struct Peripheral;
@@ -119,6 +150,31 @@ fn can_be_reset() -> bool {
     clock::within(READY_US, || read() & CORE_RESET == 0)
 }
 
+/// True if the driver's next turn ends: it has no queue to empty, or the controller can empty it.
+fn turn_ends() -> bool {
+    // SAFETY: registers of the controller that reading does not change; only the interrupt uses it now.
+    let (status, head, answer, device) = unsafe {
+        (STATUS.read_volatile(), HEAD.read_volatile(), ANSWER.read_volatile(), DEVICE_STATUS.read_volatile())
+    };
+    let queues = if status & BUS_RESET != 0 {
+        EMPTY_RECEIVE
+    } else if status & SPEED_KNOWN != 0 {
+        if device >> 1 & 0b11 == NO_SPEED {
+            return false;
+        }
+        EMPTY_RECEIVE | EMPTY_TRANSMIT | EVERY_QUEUE
+    } else if status & RECEIVED != 0 && head >> KIND_SHIFT & 0xF == QUESTION && answer & NOT_SENT != 0 {
+        EMPTY_TRANSMIT
+    } else {
+        return true;
+    };
+    // SAFETY: as above, and the driver does the same next.
+    let read = || unsafe { RESET.read_volatile() };
+    // SAFETY: as above.
+    unsafe { RESET.write_volatile(read() & !QUEUE_NUMBER | queues) };
+    clock::within(EMPTY_US, || read() & (EMPTY_RECEIVE | EMPTY_TRANSMIT) == 0)
+}
+
 /// Attaches to the host, if there is one.
 pub(super) fn start(nvic: &mut NVIC, number: &'static str) {
     let (Some(memory), Some(place)) =
@@ -150,7 +206,15 @@ pub(super) fn start(nvic: &mut NVIC, number: &'static str) {
 #[unsafe(no_mangle)]
 extern "C" fn OTG_FS() {
     // SAFETY: see `Place`.
-    let Some(Device { device, serial }) = (unsafe { &mut *DEVICE.0.get() }) else { return };
+    let place = unsafe { &mut *DEVICE.0.get() };
+    if place.is_some() && !turn_ends() {
+        defmt::error!("no USB line any more: its controller does not empty its queues");
+        *place = None;
+    }
+    let Some(Device { device, serial }) = place else {
+        NVIC::mask(Chip::OTG_FS);
+        return;
+    };
     device.poll(&mut [serial]);
     let left = TURNS_LEFT.load(Ordering::Relaxed).saturating_sub(1);
     TURNS_LEFT.store(left, Ordering::Relaxed);

@@ -5,11 +5,14 @@
 //! takes the window of the service just before the first slot.
 //!
 //! It goes on while a debugger halts the core: the pucks would hold the last torque for as long as somebody looks at a
-//! variable. A halt therefore ends in a reset, with the arm at rest.
+//! variable. A halt therefore ends in a reset, with the arm at rest. A debugger may have told the chip to let it
+//! stand still in a halt. That outlives every reset but that of the supply, so it is taken back here, and watched
+//! (`settings`).
 
-use embassy_stm32::pac::IWDG1;
 use embassy_stm32::pac::iwdg::vals::{Key, Pr};
+use embassy_stm32::pac::{DBGMCU, IWDG1};
 
+use super::super::constants::chip_settings::STANDS_IN_A_HALT;
 use super::super::constants::timers::{WATCHDOG_PRESCALER, WATCHDOG_START_TICKS, WATCHDOG_TICKS, WATCHDOG_UPDATE_US};
 use super::SelectedBoard;
 use super::clock;
@@ -27,6 +30,7 @@ const _: () = assert!(WATCHDOG_PRESCALER == 4 && WATCHDOG_START_TICKS == 0xFFF +
 
 /// Starts it with the window of the start-up.
 pub(super) fn start() {
+    DBGMCU.apb4fzr1().modify(|w| w.0 &= !STANDS_IN_A_HALT);
     key(START);
 }
 
