@@ -171,7 +171,7 @@ mod work {
     use std::path::Path;
     use std::time::Instant;
 
-    use super::{Cmd, ErrorCode, Failure, Global, Studied, Tried};
+    use super::{Cmd, ErrorCode, Failure, Global, Lifted, Studied, Tried};
     use crate::cmd::{Output, connection, files, upload};
     use control::model::WeightCorrection;
     use experiment::calibrated::{Calibrated, CalibrationError};

@@ -24,16 +24,15 @@ const SLOW: f64 = 0.01;
 /// what was expected (N, world axes). `None` where the plan does not run against the force.
 pub(crate) fn brake<R: Real>(velocity: &Vector3<R>, force: &Vector3<R>, rate: R) -> Option<Vector3<R>> {
     let against = -force.dot(velocity);
-    if !(against > R::constant(0.0)) {
-        return None;
+    if against > R::constant(0.0) {
+        let magnitude = sqrt(force.dot(force));
+        let speed = against / magnitude;
+        if speed * rate > R::constant(SLOW) {
+            let share = at_most(magnitude * R::constant(SENSITIVITY), R::constant(LARGEST));
+            return Some(force * (speed * share / (magnitude * rate)));
+        }
     }
-    let magnitude = sqrt(force.dot(force));
-    let speed = against / magnitude;
-    if !(speed * rate > R::constant(SLOW)) {
-        return None;
-    }
-    let share = at_most(magnitude * R::constant(SENSITIVITY), R::constant(LARGEST));
-    Some(force * (speed * share / (magnitude * rate)))
+    None
 }
 
 #[cfg(test)]

@@ -49,6 +49,13 @@ pub(crate) const FADE: u16 = periods(0.1);
 /// Largest distance of a digit of the hand from where the primitive starts (rad).
 const HAND_DISTANCE: f64 = 0.15;
 
+/// Control periods after which another period of braking is allowed: a touch is braked, and what swings is not. Without
+/// friction a plan that brakes all the time drives the cable of J1.
+const BRAKING: u16 = 20;
+
+/// The most that is saved up: 0.1 s of braking, after two seconds without.
+const BRAKING_FULL: u16 = BRAKING * periods(0.1);
+
 /// Age of the sensor values of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Senses {
@@ -78,6 +85,8 @@ pub(crate) struct Run<R: Real, const N: usize> {
     /// The movement has ended, and the plan stays as the feedback has bent it.
     settled: bool,
     rested: u16,
+    /// Control periods of braking that are left, [`BRAKING`] times as many.
+    braking: u16,
     goal: GoalFilter<R>,
     /// Progress at which the movement ends: 1, or later if the goal has moved.
     end: R,
@@ -135,6 +144,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             kept: FADE,
             settled: false,
             rested: 0,
+            braking: BRAKING_FULL,
             goal: GoalFilter::at(primitive.movement().goal().poses[0]),
             end: R::constant(1.0),
             load: R::constant(0.0),
@@ -200,11 +210,13 @@ impl<R: Real, const N: usize> Run<R, N> {
     /// Adds what takes the plan's speed against a force that was not expected. The force of this tick counts, not the
     /// smoothed one: each millisecond does.
     #[inline(never)]
-    fn brake(&self, primitive: &Primitive<R, N>, coupling: &mut Coupling<R>) {
-        let Some(deviation) = &self.deviation else { return };
+    fn brake(&mut self, primitive: &Primitive<R, N>, coupling: &mut Coupling<R>) {
+        self.braking = BRAKING_FULL.min(self.braking + 1);
+        let Some(deviation) = self.deviation.as_ref().filter(|_| self.braking >= BRAKING) else { return };
         let rate = primitive.movement().rate() * self.rollout.speed();
         let velocity = self.rollout.scaled_velocities()[0].into();
         if let Some(taken) = brake(&velocity, &deviation.wrench.force, rate) {
+            self.braking -= BRAKING;
             let (taken, [x, y, z]) = (taken * primitive.trust(&self.rollout), &mut coupling.poses[0].position);
             (*x, *y, *z) = (*x + taken.x, *y + taken.y, *z + taken.z);
         }
@@ -276,8 +288,11 @@ impl<R: Real, const N: usize> Run<R, N> {
             self.coupling = Coupling::NONE;
             self.settled = true;
         }
-        let kept = self.kept();
-        let mut coupling = self.coupling.map(|value| value * kept);
+        let mut coupling = self.coupling;
+        if self.kept < FADE {
+            let kept = self.kept();
+            coupling = coupling.map(|value| value * kept);
+        }
         if senses == Senses::Fresh && self.options.compliant && !gripping && self.bends(primitive) {
             self.brake(primitive, &mut coupling);
         }
