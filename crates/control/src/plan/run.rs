@@ -53,8 +53,9 @@ const HAND_DISTANCE: f64 = 0.15;
 /// friction a plan that brakes all the time drives the cable of J1.
 const BRAKING: u16 = 20;
 
-/// The most that is saved up: 0.1 s of braking, after two seconds without.
-const BRAKING_FULL: u16 = BRAKING * periods(0.1);
+/// The most that is saved up: a quarter of a second of braking, after five seconds without. A hand that meets something
+/// bounces off it a few times.
+const BRAKING_FULL: u16 = BRAKING * periods(0.25);
 
 /// Age of the sensor values of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
