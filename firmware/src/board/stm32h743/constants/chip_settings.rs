@@ -25,6 +25,9 @@ pub const STANDS_IN_A_HALT: u32 = 1 << 18;
 /// In RCC.CSR: the oscillator of the watchdog is ready (LSIRDY).
 const WATCHDOG_CLOCK: u32 = 1 << 1;
 
+/// PWR.CR3 without the bit that tells whether the supply of USB is there (USB33RDY): a cable is no reason to end.
+const WITHOUT_USB_SUPPLY: u32 = !(1 << 26);
+
 /// USART3.CR3 without the interrupt for room to send, which comes and goes.
 const WITHOUT_ROOM_TO_SEND: u32 = !(1 << 23);
 
@@ -58,7 +61,7 @@ pub const PLACES: [Place; 51] = [
     all(0x5802_44E8),
     all(0x5802_44EC),
     // PWR: CR3, D3CR, supply of the core.
-    all(0x5802_480C),
+    some(0x5802_480C, WITHOUT_USB_SUPPLY),
     all(0x5802_4818),
     // FLASH.ACR: wait states.
     all(0x5200_2000),
