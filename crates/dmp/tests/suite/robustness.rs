@@ -153,6 +153,19 @@ fn frozen_time_holds_the_plan_and_resumes_on_the_same_path() {
     assert!((rows[2399].poses[0].position.x[0] - 0.55).abs() < 2e-3);
 }
 
+/// The change that makes it fail: the velocities are those of the step before.
+#[test]
+fn a_run_tells_the_velocity_of_its_next_step_before_it() {
+    let primitive = Plan::golden().build::<f64>();
+    let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+    rollout.set_speed(&primitive, 1.7).unwrap();
+    for _ in 0..400 {
+        let [told] = rollout.scaled_velocities();
+        let plan = rollout.step(&primitive, DT, &Coupling::NONE).unwrap();
+        assert_eq!(plan.poses[0].position.v, told.map(|v| v * plan.rate));
+    }
+}
+
 #[test]
 fn a_late_tick_is_an_error_and_a_senseless_one_moves_nothing() {
     let primitive = Plan::golden().build::<f64>();
