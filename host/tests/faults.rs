@@ -2,14 +2,15 @@
 
 #[path = "../../crates/lab/tests/common/mod.rs"]
 mod common;
+#[path = "common/served_arm.rs"]
+mod served_arm;
 
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
 
 use control::{Fault, RATE_HZ, State};
 use lab::fault_guide::FaultGuide;
 use serde_json::Value;
+use served_arm::{Arm, tactus};
 
 /// The replies of one puck are lost for 50 ms, 1.5 s after the first torque: on the way to the start of the movement.
 const SCRIPT: &str = "
@@ -25,46 +26,11 @@ inject = [{ at = 1.5, lasts = 0.05, what.drop = { kind = \"position\", from = [4
 expect = { state = [\"soft stop\"] }
 ";
 
-fn command(folder: &Path, line: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("TACTUS_DEVICE", "unix:arm.sock").stdin(Stdio::null());
-    command.args(line.split_whitespace());
-    command
-}
-
-fn tactus(folder: &Path, line: &str) -> Output {
-    command(folder, line).output().unwrap()
-}
-
 #[track_caller]
 fn object(folder: &Path, line: &str) -> Value {
     let output = tactus(folder, &format!("--json {line}"));
     assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
-}
-
-/// A simulated arm in a process of its own, which ends with the test.
-struct Arm(Child);
-
-impl Arm {
-    fn start(folder: &Path) -> Arm {
-        std::fs::write(folder.join("lost.toml"), SCRIPT).unwrap();
-        let serve = "--device sil:world=simple sim --listen unix:arm.sock --faults lost.toml";
-        let arm = Arm(command(folder, serve).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
-        let started = Instant::now();
-        while !folder.join("arm.sock").exists() {
-            assert!(started.elapsed() < Duration::from_secs(20), "the simulated arm does not listen");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        arm
-    }
-}
-
-impl Drop for Arm {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 #[test]
@@ -88,7 +54,7 @@ fn cli_2_a_fault_of_a_run_is_told_unprompted_and_its_last_second_can_be_read_bef
     let folder = folder.path();
     common::demonstration(folder, 3.0);
     assert!(tactus(folder, "learn demo.csv -o reach.toml").status.success());
-    let _arm = Arm::start(folder);
+    let _arm = Arm::start(folder, SCRIPT);
     let quiet = object(folder, "faults");
     assert_eq!((&quiet["present"], &quiet["last"]), (&Value::Null, &Value::Null));
     let nothing = tactus(folder, "faults --record fault.csv");

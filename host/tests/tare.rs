@@ -1,21 +1,12 @@
 //! `tactus tare`: a sensor that has drifted gets its zero again, a load does not become one unasked.
 
+#[path = "common/served_arm.rs"]
+mod served_arm;
+
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
 
 use serde_json::Value;
-
-fn command(folder: &Path, line: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("TACTUS_DEVICE", "unix:arm.sock").stdin(Stdio::null());
-    command.args(line.split_whitespace());
-    command
-}
-
-fn tactus(folder: &Path, line: &str) -> Output {
-    command(folder, line).output().unwrap()
-}
+use served_arm::{Arm, tactus};
 
 #[track_caller]
 fn object(folder: &Path, line: &str, code: i32) -> Value {
@@ -24,33 +15,12 @@ fn object(folder: &Path, line: &str, code: i32) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// A simulated arm in a process of its own, which ends with the test. Half a second after its first torque its force
-/// sensor is wrong by so many newtons along its third axis.
-struct Arm(Child);
-
-impl Arm {
-    fn start(folder: &Path, newtons: f64) -> Arm {
-        let script = format!(
-            "title = \"drift\"\nbar = \"none\"\ntoday = \"held\"\n[[scenario]]\nname = \"drift\"\nfrom = \"hold\"\nwatch = 3.0\n\
-             inject = [{{ at = 0.5, what.sensor.error = [0, 0, {newtons}, 0, 0, 0] }}]\nexpect = {{ state = [\"hold\"] }}\n"
-        );
-        std::fs::write(folder.join("drift.toml"), script).unwrap();
-        let serve = "--device sil:world=simple sim --listen unix:arm.sock --faults drift.toml";
-        let arm = Arm(command(folder, serve).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
-        let started = Instant::now();
-        while !folder.join("arm.sock").exists() {
-            assert!(started.elapsed() < Duration::from_secs(20), "the simulated arm does not listen");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        arm
-    }
-}
-
-impl Drop for Arm {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
+/// Half a second after the first torque the force sensor is wrong by so many newtons along its third axis.
+fn drift(newtons: f64) -> String {
+    format!(
+        "title = \"drift\"\nbar = \"none\"\ntoday = \"held\"\n[[scenario]]\nname = \"drift\"\nfrom = \"hold\"\nwatch = 3.0\n\
+         inject = [{{ at = 0.5, what.sensor.error = [0, 0, {newtons}, 0, 0, 0] }}]\nexpect = {{ state = [\"hold\"] }}\n"
+    )
 }
 
 /// Size of the force of a reading, N.
@@ -64,7 +34,7 @@ fn a_drift_becomes_zero_at_once_and_a_load_only_when_a_person_says_so() {
     for (newtons, is_load) in [(0.7, false), (3.0, true)] {
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path();
-        let _arm = Arm::start(folder, newtons);
+        let _arm = Arm::start(folder, &drift(newtons));
         object(folder, "hand open", 0);
         if is_load {
             let refused = object(folder, "tare", 6);
