@@ -88,8 +88,8 @@ impl FaultGuide {
                 "the joint that stands still in the record although it was moved",
             ),
             Fault::UnseenContact => (
-                "the arm was pushed while the force sensor was silent, or carries a hand whose sensor never answered",
-                "obstacles, the plug of the sensor at the wrist, and `tactus calibrate payload`",
+                "elbow or forearm met something or somebody, or the arm was pushed while the force sensor was silent, or the sensor tells of a push that no joint knows of, or the arm carries a hand whose sensor never answered",
+                "obstacles; the plug and the mounting of the sensor at the wrist; `tactus tare`, and `tactus calibrate payload`",
             ),
             Fault::MotorHot => (
                 "long work against gravity or against an obstacle, or a warm room",

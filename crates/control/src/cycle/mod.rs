@@ -61,8 +61,7 @@ const WRENCH_AGE: u8 = few_periods(1.0 / 60.0);
 /// Length of the ramp that takes all but gravity and damping away in a soft stop: 100 ms, in control periods.
 const STOP_RAMP: u16 = periods(0.1);
 
-/// Length of the ramp that takes away what a compliant run inherits from the stiff hold before it: 1 s, in control
-/// periods.
+/// Length of the ramp that takes away what a compliant run inherits from a stiff hold: 1 s, in control periods.
 const HANDOVER: u16 = periods(1.0);
 
 /// Time in which the torque of gravity builds up after arming: 100 ms, in control periods.
@@ -428,6 +427,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             // The feedback fades in the meantime.
             wrench_lost: self.is_blind(u16::from(WRENCH_AGE) + FADE),
             blind: self.is_blind(WRENCH_AGE.into()) || self.is_bare() && self.armed_for >= laws::ARMING,
+            carried: self.armed_for >= laws::ARMING,
             effort,
             shakes: self.observer.shakes(),
             full_scale: self.wrench.full_scale().force > 0 || (depends && self.wrench.full_scale().torque > 0),

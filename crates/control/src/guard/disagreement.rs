@@ -45,11 +45,25 @@ const SWINGS_BACK: u8 = few_periods(0.15);
 /// Time without a count, before a swing means anything: 50 ms, in control periods.
 const STILL: u8 = few_periods(0.05);
 
-/// Feedback torque of a joint that means a push, in parts of the model's friction: nominal motions stay below 2.5.
+/// Feedback torque of a joint that means a push where no sensor tells of one, in parts of the model's friction: nominal
+/// motions stay below 2.5.
 const PUSH: f64 = 3.5;
 
-/// Time for which it has to push: 10 ms, in control periods.
+/// The same of J1 to J4 beside a sensor (N m), once what it measures is taken off: elbow and forearm meet something.
+/// Friction, a kilogram at the hand that the tare took away, and masses that differ by a tenth stay below.
+const UNSEEN: [f64; 4] = [7.5, 14.0, 11.0, 7.0];
+
+/// Measured force (N) of which the joints have to know.
+const TOLD: f64 = 5.0;
+
+/// Time for which they may not: a push first sets the arm in motion. 0.2 s, in control periods.
+const CONTRADICTING: u8 = few_periods(0.2);
+
+/// Time for which the feedback has to push: 10 ms, in control periods.
 const PUSHING: u8 = few_periods(0.01);
+
+/// Control periods for which one with such a feedback counts.
+const OBVIOUS: u8 = CONTRADICTING / PUSHING;
 
 /// Source of the motion that is asked of the joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,6 +111,7 @@ pub(crate) struct Disagreement<R: Real> {
     beyond: [u8; JOINTS],
     /// Control periods for which the arm still swings back from what has pushed it.
     swings_back: u8,
+    /// Control periods for which something has pushed, one with its feedback being [`OBVIOUS`].
     pushing: u8,
 }
 
@@ -119,6 +134,11 @@ impl<R: Real> Disagreement<R> {
     /// Forgets what was seen: no feedback acts.
     pub(crate) fn reset(&mut self) {
         self.still = [0; JOINTS];
+        self.forget_pushes();
+    }
+
+    /// Forgets what has pushed until now.
+    pub(crate) fn forget_pushes(&mut self) {
         self.pushing = 0;
     }
 
@@ -199,13 +219,41 @@ impl<R: Real> Disagreement<R> {
     /// is silent.
     #[inline(never)]
     pub(crate) fn is_pushed(&mut self, feedback: &Vector7<R>) -> bool {
-        let beyond = feedback.iter().zip(wam7::FRICTION_COULOMB).any(|(torque, friction)| {
-            let bar = R::constant(PUSH * friction);
-            *torque > bar || *torque < -bar
-        });
-        self.pushing = if beyond { self.pushing.saturating_add(1) } else { 0 };
-        self.pushing >= PUSHING
+        let pushes = exceeds(feedback, wam7::FRICTION_COULOMB.map(|friction| PUSH * friction));
+        self.goes_on(if pushes { OBVIOUS } else { 0 })
     }
+
+    /// The same beside a sensor: `unexplained` is what was sent against friction, less what the sensor explains of it
+    /// (N m). True as well if the sensor has told for 0.2 s of a push that the joints do not know of.
+    ///
+    /// Not inlined: it is asked where [`is_large`] says so.
+    #[inline(never)]
+    pub(crate) fn is_contradicted(&mut self, feedback: &Vector7<R>, unexplained: &Vector7<R>) -> bool {
+        self.goes_on(match (exceeds(unexplained, UNSEEN), exceeds(feedback, UNSEEN)) {
+            (true, true) => OBVIOUS,
+            (true, false) => 1,
+            (false, _) => 0,
+        })
+    }
+
+    /// Takes for how many control periods this one counts; true if something has pushed for long enough.
+    fn goes_on(&mut self, periods: u8) -> bool {
+        self.pushing = if periods > 0 { self.pushing.saturating_add(periods) } else { 0 };
+        self.pushing >= CONTRADICTING
+    }
+}
+
+/// True if the feedback torque (N m) or the measured force (N) is that of a push.
+pub(crate) fn is_large<R: Real>(feedback: &Vector7<R>, force: R) -> bool {
+    force > R::constant(TOLD) || exceeds(feedback, UNSEEN)
+}
+
+/// True if the torque of a joint (N m) is beyond its bar.
+fn exceeds<R: Real, const N: usize>(torques: &Vector7<R>, bars: [f64; N]) -> bool {
+    torques.iter().zip(bars).any(|(torque, bar)| {
+        let bar = R::constant(bar);
+        *torque > bar || *torque < -bar
+    })
 }
 
 #[cfg(test)]
@@ -406,6 +454,32 @@ mod tests {
                 assert_eq!(found, expected, "J{}: {torque} N m", joint + 1);
             }
         }
+    }
+
+    #[test]
+    fn beside_a_sensor_a_push_is_what_its_wrench_does_not_explain_of_j1_to_j4() {
+        let at = |joint: usize, torque: f64| {
+            let mut joints = Vector7::zeros();
+            joints[joint] = torque;
+            joints
+        };
+        let found = |feedback: Vector7<f64>, rest: Vector7<f64>| {
+            let mut seen = new();
+            (1..=2 * CONTRADICTING).find(|_| seen.is_contradicted(&feedback, &rest))
+        };
+        for (joint, bar) in UNSEEN.into_iter().enumerate() {
+            for sign in [1.0, -1.0] {
+                let (bar, more) = (at(joint, sign * bar), at(joint, 1.001 * sign * bar));
+                assert_eq!(found(more, more), Some(PUSHING), "J{}", joint + 1);
+                assert_eq!(found(bar, more), Some(CONTRADICTING), "J{}: the sensor tells of a push", joint + 1);
+                assert_eq!(found(more, bar), None, "J{}: the sensor explains it", joint + 1);
+                assert!(is_large(&more, 0.0) && !is_large(&bar, TOLD), "J{}", joint + 1);
+            }
+        }
+        for joint in UNSEEN.len()..JOINTS {
+            assert_eq!(found(at(joint, 1e3), at(joint, 1e3)), None, "J{}", joint + 1);
+        }
+        assert!(is_large(&Vector7::zeros(), 1.001 * TOLD));
     }
 
     #[test]

@@ -40,7 +40,8 @@ pub enum Fault {
     Overrun = 13,
     /// The counts of a motor do not change although it turns.
     EncoderStuck = 14,
-    /// Something pushed the arm, or hung on it, while the wrench sensor was silent, or where there is none.
+    /// Something pushed the arm, or hung on it, and the wrench sensor did not tell: it was silent, there is none, or it
+    /// was elbow or forearm. Or the sensor told of a push that the joints do not know of.
     UnseenContact = 15,
     /// A motor is too hot to go on.
     MotorHot = 16,
@@ -135,7 +136,7 @@ impl Fault {
                 "the counts of a motor stood still while it turned; check the encoder cable, then zero the arm again"
             }
             Fault::UnseenContact => {
-                "something pushes the arm, or hangs on it, and no force sensor tells; look for an obstacle, check what it carries"
+                "joints and force sensor disagree on what pushes the arm or hangs on it; look for an obstacle, check what it carries, tare"
             }
             Fault::OtherPayload => {
                 "the sensor or the hand answers now and did not at the start-up; support and release the arm, the bus is then started anew"

@@ -11,7 +11,7 @@ use crate::model::wam7;
 use crate::real::Real;
 use crate::sense::joints::{COAST_CYCLES, JointState};
 use crate::time::few_periods;
-use crate::units::{JOINTS, Wrench};
+use crate::units::{JOINTS, Vector7, Wrench};
 
 /// Largest speed of elbow and forearm in any state with torque (m/s); the safety module faults at 1.0.
 pub const TIP_SPEED_LIMIT: f64 = 0.8;
@@ -66,6 +66,8 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) wrench_lost: bool,
     /// True if no fresh force tells of a contact: the sensor is silent, or there is none.
     pub(crate) blind: bool,
+    /// True once gravity is carried in full: until then the feedback carries it.
+    pub(crate) carried: bool,
     /// Torques and motion that the law asks of the joints, where it feeds anything back.
     pub(crate) effort: Option<Effort<'a, R>>,
     /// True if the sensor has been at full scale: in a force, or in a torque that the run depends on.
@@ -104,11 +106,12 @@ impl<R: Real> Monitor<R> {
             let fault = if state.implausible { Fault::ImplausiblePosition } else { Fault::RepliesLost };
             return Some((Trigger::SoftFault, fault));
         }
-        let (stuck, pushed) = self.disagrees(state, seen);
+        let follows_plan = matches!(law, State::Approach | State::Run);
+        let (stuck, pushed) = self.disagrees(follows_plan, state, seen);
         // A value that was measured long ago says nothing of now.
         let pressed = !seen.blind && (seen.force > R::constant(FORCE_LIMIT) || seen.full_scale);
         self.pressed = if pressed { self.pressed.saturating_add(1) } else { 0 };
-        let moving_by_itself = matches!(law, State::Hold | State::Approach | State::Run);
+        let moving_by_itself = follows_plan || law == State::Hold;
         let finding = if moving_by_itself && self.pressed >= FORCE_CYCLES {
             Some(Fault::ContactForce)
         } else if stuck {
@@ -119,7 +122,7 @@ impl<R: Real> Monitor<R> {
             Some(Fault::Shaking)
         } else if moving_by_itself && seen.bounds.violated(&state.q) {
             Some(Fault::JointLimit)
-        } else if matches!(law, State::Approach | State::Run) && seen.wrench_lost {
+        } else if follows_plan && seen.wrench_lost {
             Some(Fault::WrenchLost)
         } else if law == State::Run && (seen.lag.0 > R::constant(TRACKING_LIMIT) || seen.lag.1 > R::constant(LAG_LIMIT))
         {
@@ -139,7 +142,7 @@ impl<R: Real> Monitor<R> {
     }
 
     /// True if an encoder stands still; true if something pushes that the sensor does not see.
-    fn disagrees(&mut self, state: &JointState<R>, seen: &Observation<'_, R>) -> (bool, bool) {
+    fn disagrees(&mut self, follows_plan: bool, state: &JointState<R>, seen: &Observation<'_, R>) -> (bool, bool) {
         match &seen.effort {
             Some(effort) if state.missing == 0 => {
                 let stuck = if state.still == 0 {
@@ -149,7 +152,15 @@ impl<R: Real> Monitor<R> {
                     let environment = disagreement::torques_of(seen.wrench, seen.frames);
                     self.disagreement.encoder_stands_still(effort, &environment, seen.force, state.still)
                 };
-                (stuck, seen.blind && self.disagreement.is_pushed(effort.feedback))
+                let pushed = if seen.blind {
+                    self.disagreement.is_pushed(effort.feedback)
+                } else if follows_plan && seen.carried && disagreement::is_large(effort.feedback, seen.force) {
+                    self.disagreement.is_contradicted(effort.feedback, &unexplained(effort, seen))
+                } else {
+                    self.disagreement.forget_pushes();
+                    false
+                };
+                (stuck, pushed)
             }
             Some(_) => (false, false),
             None => {
@@ -160,13 +171,22 @@ impl<R: Real> Monitor<R> {
     }
 }
 
+/// Torque that was sent against friction, less what the sensor explains of it (N m). A joint that is slowed down is no
+/// joint that is pushed: measured motion alone asks for more than is sent. Not inlined: it is asked where the feedback
+/// is that of a push.
+#[inline(never)]
+fn unexplained<R: Real>(effort: &Effort<'_, R>, seen: &Observation<'_, R>) -> Vector7<R> {
+    let environment = disagreement::torques_of(seen.wrench, seen.frames);
+    effort.sent + effort.pressing.map_or(environment, |pressing| environment + pressing)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::guard::disagreement::Plan;
     use crate::model::arm::ArmModel;
     use crate::model::calibration::{Calibration, Payload};
-    use crate::units::{JointPositions, JointVelocities, Vector7};
+    use crate::units::{JointPositions, JointVelocities};
 
     const POSTURE: [f64; JOINTS] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
 
@@ -186,10 +206,16 @@ mod tests {
         lag: (f64, f64),
         wrench_lost: bool,
         blind: bool,
+        carried: bool,
         full_scale: bool,
         shakes: bool,
         /// Feedback torque and desired velocity.
         effort: Option<(Vector7<f64>, Vector7<f64>)>,
+        /// Torque that was sent, unless it is the feedback.
+        sent: Option<Vector7<f64>>,
+        /// Torque of the force control.
+        pressing: Vector7<f64>,
+        wrench: Wrench<f64>,
     }
 
     impl Scene {
@@ -218,9 +244,13 @@ mod tests {
                 lag: (0.0, 0.0),
                 wrench_lost: false,
                 blind: false,
+                carried: true,
                 full_scale: false,
                 shakes: false,
                 effort: None,
+                sent: None,
+                pressing: Vector7::zeros(),
+                wrench: Wrench::zero(),
             }
         }
 
@@ -235,8 +265,8 @@ mod tests {
             let frames = Frames::new(&self.model, &self.state.q);
             let effort = self.effort.as_ref().map(|(feedback, desired)| Effort {
                 feedback,
-                pressing: None,
-                sent: *feedback,
+                pressing: Some(&self.pressing),
+                sent: self.sent.unwrap_or(*feedback),
                 desired,
                 breaking_away: 0,
                 plan: Plan::Run,
@@ -245,10 +275,11 @@ mod tests {
                 frames: &frames,
                 bounds: &self.bounds,
                 force: self.force,
-                wrench: &Wrench::zero(),
+                wrench: &self.wrench,
                 lag: self.lag,
                 wrench_lost: self.wrench_lost,
                 blind: self.blind,
+                carried: self.carried,
                 effort,
                 full_scale: self.full_scale,
                 shakes: self.shakes,
@@ -433,23 +464,64 @@ mod tests {
     #[test]
     fn a_motor_that_stands_against_its_torque_stops_the_arm_unless_a_reply_is_missing() {
         assert_eq!(standing(0, 0b1000), stop(Fault::EncoderStuck));
-        assert_eq!(standing(0, 0), NOTHING, "it turns");
+        assert_eq!(standing(0, 0), stop(Fault::UnseenContact), "it turns: something else holds it back");
         assert_eq!(standing(1, 0b1000), (Trigger::RepliesMissing, Fault::None));
     }
 
+    /// The finding after a while in which J2 feeds back `torque` (N m), where nothing else is wrong.
+    fn pressed_by(law: State, torque: f64, change: impl FnOnce(&mut Scene)) -> (Trigger, Fault) {
+        let mut feedback = Vector7::zeros();
+        feedback[1] = torque;
+        let mut scene = Scene::with(|scene| scene.effort = Some((feedback, Vector7::zeros())));
+        change(&mut scene);
+        for _ in 0..few_periods(0.1) {
+            scene.check(law);
+        }
+        scene.check(law)
+    }
+
     #[test]
-    fn a_push_is_looked_for_in_the_torque_only_while_the_sensor_is_silent() {
-        let pushed = |blind| {
-            let mut scene = Scene::with(|scene| {
-                scene.blind = blind;
-                scene.effort = Some((Vector7::repeat(100.0), Vector7::zeros()));
-            });
-            for _ in 0..few_periods(0.1) {
-                scene.check(State::Hold);
-            }
-            scene.check(State::Hold)
+    fn a_push_is_looked_for_in_the_torque_while_the_sensor_is_silent_or_the_arm_follows_a_plan() {
+        for law in MOVING {
+            assert_eq!(pressed_by(law, 100.0, |scene| scene.blind = true), stop(Fault::UnseenContact), "{law}");
+            let expected = if law == State::Hold { NOTHING } else { stop(Fault::UnseenContact) };
+            assert_eq!(pressed_by(law, 100.0, |_| ()), expected, "{law}");
+            assert_eq!(pressed_by(law, 100.0, |scene| scene.carried = false), NOTHING, "{law}");
+        }
+        // A joint that brakes itself is not pushed: what was sent is little.
+        assert_eq!(pressed_by(State::Run, 100.0, |scene| scene.sent = Some(Vector7::zeros())), NOTHING);
+    }
+
+    #[test]
+    fn what_the_sensor_measures_or_the_force_control_presses_is_no_unseen_push() {
+        let scene = Scene::calm();
+        let frames = Frames::new(&scene.model, &scene.state.q);
+        let wrench = Wrench { force: nalgebra::Vector3::new(0.0, 0.0, -40.0), ..Wrench::zero() };
+        let torques = -disagreement::torques_of(&wrench, &frames);
+        assert!(torques[1] < -20.0, "{torques} N m");
+        let found = |wrench, pressing| {
+            pressed_by(State::Run, 0.0, |scene| {
+                scene.effort = Some((torques, Vector7::zeros()));
+                (scene.wrench, scene.pressing) = (wrench, pressing);
+            })
         };
-        assert_eq!(pushed(true), stop(Fault::UnseenContact));
-        assert_eq!(pushed(false), NOTHING);
+        assert_eq!(found(wrench, Vector7::zeros()), NOTHING, "carried, and measured");
+        assert_eq!(found(Wrench::zero(), Vector7::zeros()), stop(Fault::UnseenContact), "carried, and not measured");
+        assert_eq!(found(Wrench::zero(), -torques), NOTHING, "pressed against by the force control");
+        let turned = Wrench { force: -wrench.force, ..wrench };
+        assert_eq!(found(turned, Vector7::zeros()), stop(Fault::UnseenContact), "a sensor with the wrong sign");
+        // A push of which the joints know nothing.
+        let told = |force| {
+            pressed_by(State::Run, 0.0, |scene| {
+                (scene.wrench, scene.force) = (wrench, force);
+            })
+        };
+        assert_eq!((told(40.0), told(5.0)), (NOTHING, NOTHING), "not for a tenth of a second");
+        let mut scene = Scene::with(|scene| {
+            (scene.wrench, scene.force) = (wrench, 40.0);
+            scene.effort = Some((Vector7::zeros(), Vector7::zeros()));
+        });
+        let found = (1..=few_periods(0.5)).find(|_| scene.check(State::Run) == stop(Fault::UnseenContact));
+        assert_eq!(found, Some(few_periods(0.2)));
     }
 }

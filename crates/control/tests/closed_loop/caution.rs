@@ -208,6 +208,7 @@ fn e8_a_clear_is_refused_while_the_motors_are_silent_even_after_the_safety_modul
 #[test]
 fn a15_what_an_integral_had_gathered_is_gone_after_a_drop_of_the_safety_module() {
     let mut rig = holding();
+    rig.command(Command::Tare);
     // A person leans on the arm until the integrals are full.
     rig.plant.push = [0.0, 15.0, 0.0, 0.0, 0.0, 0.0];
     rig.run_for(3.0);

@@ -200,8 +200,9 @@ fn b3_a8_an_arm_that_runs_into_something_presses_little_and_is_not_called_stuck(
 }
 
 /// Largest force of a wall of this stiffness (N/m) that stands 6 cm before the end of a movement whose sensor has the
-/// wrong sign (N), and how far the plan went beyond its goal (m), until the run ended or was stopped.
-fn reversed(options: RunOptions, stiffness: f64) -> (f64, f64) {
+/// wrong sign (N), and how far the plan went beyond its goal (m), until the run ended or was stopped; if it was, the
+/// seconds from the first 5 N to the stop.
+fn reversed(options: RunOptions, stiffness: f64) -> (f64, f64, Option<f64>) {
     let far = Rig::<f32>::new(GOAL, 1).plant.frames().tool_pose().position.x;
     let mut rig = holding::<f32>(START);
     let design = Design { duration: 3.0, bent: false, expected: Some([0.0; 6]), ..Design::default() };
@@ -209,12 +210,14 @@ fn reversed(options: RunOptions, stiffness: f64) -> (f64, f64) {
     rig.plant.wall = Some((far - 0.06, stiffness));
     rig.plant.reversed = true;
     rig.command(Command::Run(options));
-    let (mut peak, mut beyond) = (0.0f64, 0.0f64);
+    let (mut peak, mut beyond, mut touched) = (0.0f64, 0.0f64, 0.0);
     while rig.cycle.state() == State::Run {
         let record = rig.tick(None).record;
         peak = peak.max(-rig.plant.environment()[0]);
+        touched += if peak > 5.0 { control::PERIOD } else { 0.0 };
         beyond = beyond.max(f64::from(record.pose_d[0]) - far);
     }
+    let stopped = (rig.cycle.fault() != Fault::None).then_some(touched);
     // Whatever it ended in can be left, and nothing swings.
     rig.plant.wall = None;
     rig.run_for(1.0);
@@ -225,25 +228,32 @@ fn reversed(options: RunOptions, stiffness: f64) -> (f64, f64) {
     rig.run_for(0.5);
     assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));
     assert!(rig.plant.dq.amax() < 0.05, "at rest: {}", rig.plant.dq);
-    (peak, beyond)
+    (peak, beyond, stopped)
 }
 
+/// Without the rule it presses with up to 27 N, is led 95 mm beyond its goal, and is not stopped.
+///
+/// The change that makes it fail: a push that the sensor tells of and the joints do not know is believed for ever.
 #[test]
-fn b7_a_sensor_with_the_wrong_sign_presses_little_and_leads_the_plan_no_farther_than_its_clamps() {
-    let mut worst = (0.0f64, 0.0f64);
+fn b7_a_sensor_with_the_wrong_sign_is_contradicted_by_the_joints_and_stops_the_run() {
+    let (mut hardest, mut farthest, mut slowest, mut prompt) = (0.0f64, 0.0f64, 0.0f64, 0);
     for (feedback, force_control) in [(true, false), (true, true), (false, true)] {
         for (compliant, stiffness) in
             [(true, 300.0), (true, 3000.0), (false, 300.0), (false, 3000.0), (false, 10_000.0)]
         {
             let options = RunOptions { feedback, force_control, compliant, ..RunOptions::default() };
-            let (peak, beyond) = reversed(options, stiffness);
-            println!("{feedback} {force_control} {compliant} {stiffness} N/m: {peak:.1} N, {beyond:.3} m");
-            worst = (worst.0.max(peak), worst.1.max(beyond));
+            let (peak, beyond, stopped) = reversed(options, stiffness);
+            println!("{feedback} {force_control} {compliant} {stiffness} N/m: {peak:.1} N, {beyond:.3} m, {stopped:?}");
+            let seconds = stopped.expect("nobody stops it");
+            (hardest, farthest, slowest) = (hardest.max(peak), farthest.max(beyond), slowest.max(seconds));
+            prompt += u32::from(seconds <= 0.5);
         }
     }
-    // The right sign presses with up to 25 N here. The clamps are what keeps it: without them the force has no end.
-    assert!(worst.0 < 32.0 && worst.1 < DISPLACEMENT, "{worst:?}");
-    assert!(worst.1 > 0.5 * DISPLACEMENT, "the plan was led away at all: {worst:?}");
+    println!("{hardest:.1} N, {farthest:.3} m, {slowest:.3} s, {prompt} of 15 within 0.5 s");
+    // The right sign presses with up to 25 N here.
+    assert!(hardest < 25.0 && farthest < 0.5 * DISPLACEMENT, "{hardest} N, {farthest} m");
+    // A wall that is soft is pressed for longer before the joints know of it, and with 9 N.
+    assert!(slowest <= 0.9 && prompt >= 13, "{slowest} s, {prompt} of 15");
 }
 
 /// Way (m) by which one wild sample of `outlier` (N) moves the plan of a run that `push` (N) bends already.

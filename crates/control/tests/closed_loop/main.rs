@@ -16,4 +16,5 @@ mod rig;
 mod settling;
 mod shoves;
 mod tracking;
+mod unseen;
 mod weight;

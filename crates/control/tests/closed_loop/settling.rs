@@ -172,13 +172,13 @@ fn let_go_of(friction: f64, (joint, torque): (usize, f64), has_integral: bool) -
 }
 
 /// The integral is wound up by an unseen push, to its bound and no farther: the arm is drawn past its plan by what that
-/// bends its spring, and hardly faster than the spring alone draws it.
+/// bends its spring, and hardly faster than the spring alone draws it. J1 is not pushed harder: that stops the arm.
 ///
 /// The change that makes it fail: a bound of three times the friction.
 #[test]
 fn a_compliant_arm_that_was_led_aside_by_its_elbow_is_not_thrown_when_it_is_let_go_of() {
     for friction in [0.0, 1.0] {
-        for aside in [(0, 8.0), (1, 12.0), (1, -12.0), (2, 5.0), (3, 5.0), (3, -5.0)] {
+        for aside in [(0, 6.0), (1, 12.0), (1, -12.0), (2, 5.0), (3, 5.0), (3, -5.0)] {
             let (with, without) = (let_go_of(friction, aside, true), let_go_of(friction, aside, false));
             println!("friction x{friction}, J{} by {} N m: {with:.3?}, without {without:.3?}", aside.0 + 1, aside.1);
             assert!(with.0 < without.0 + 0.12, "{with:?}, without {without:?}");
