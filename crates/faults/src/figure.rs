@@ -24,6 +24,8 @@ pub enum Figure {
     Deviation,
     /// Distance of the hand from its plan, RMS, as a multiple of that without the faults.
     Tracking,
+    /// Largest distance of the hand from its plan, beyond the largest without the faults, mm.
+    Astray,
     /// Largest difference of the planned hand from the same scenario without the faults, mm.
     Plan,
     /// Time from the first fault or order until the arm has left its motion, ms.
@@ -93,6 +95,7 @@ impl Figure {
             Self::CausesLost => ("causes overwritten", ""),
             Self::Deviation => ("off nominal", "mrad"),
             Self::Tracking => ("tracking", "of nominal"),
+            Self::Astray => ("off its plan, beyond nominal", "mm"),
             Self::Plan => ("plan off nominal", "mm"),
             Self::Stop => ("stops after", "ms"),
             Self::Still => ("still after", "ms"),

@@ -223,6 +223,11 @@ fn against(moments: &[Moment], nominal: &[Moment]) -> Figures {
         let squares: f64 = plans.iter().map(|(_, plan, hand)| distance(plan, hand).powi(2)).sum();
         (squares / plans.len().max(1) as f64).sqrt()
     };
+    // What no plan was told for is no distance from it.
+    let farthest = |plans: &[(f64, [f64; 3], [f64; 3])]| {
+        let off = largest(plans.iter().map(|(_, plan, hand)| distance(plan, hand)));
+        if plans.is_empty() { f64::NAN } else { off }
+    };
     let apart = planned.iter().filter_map(|(time, plan, _)| {
         let later = wanted.partition_point(|(other, ..)| other < time);
         let nearest = wanted.get(later.saturating_sub(1)..(later + 1).min(wanted.len()))?;
@@ -231,6 +236,7 @@ fn against(moments: &[Moment], nominal: &[Moment]) -> Figures {
     Figures::from([
         (Figure::Deviation, 1e3 * deviation),
         (Figure::Tracking, rms(&planned) / rms(&wanted).max(1e-9)),
+        (Figure::Astray, 1e3 * largest([farthest(&planned) - farthest(&wanted)])),
         (Figure::Plan, 1e3 * largest(apart)),
     ])
 }

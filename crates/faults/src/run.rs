@@ -109,7 +109,8 @@ pub fn run(entry: &Entry, scenario: &Scenario, kind: SimulatorKind) -> Verdict {
 }
 
 fn go_through(scenario: &Scenario, kind: SimulatorKind, verdict: &mut Verdict) -> Result<(), Failure> {
-    let compares = |figure: &Figure| matches!(figure, Figure::Deviation | Figure::Tracking | Figure::Plan);
+    let compares =
+        |figure: &Figure| matches!(figure, Figure::Deviation | Figure::Tracking | Figure::Astray | Figure::Plan);
     let (most, least) = (&scenario.expect.most, &scenario.expect.least);
     let nominal = most.keys().chain(least.keys()).any(compares).then(|| watched_without(scenario, kind)).transpose()?;
     for arm in scenario.each() {

@@ -68,6 +68,26 @@ fn what_is_not_a_number_is_within_no_bar() {
     }
 }
 
+/// The change that makes it fail: the distance from the plan is taken without that of the arm without the faults.
+#[test]
+fn an_arm_is_astray_by_what_it_is_farther_from_its_plan_than_without_the_faults() {
+    let following = |off: f64| {
+        let mut watched = stopped(0.2);
+        for moment in &mut watched.moments {
+            let [x, y, z] = moment.hand;
+            moment.told = Some(([0.0; 7], [x, y + if moment.time > 0.5 { off } else { 0.0 }, z]));
+        }
+        watched
+    };
+    let astray = |watched: &Watched, nominal: &Watched| {
+        let scenario = scenario("from = \"hold\"\nwatch = 1");
+        measure::all(&scenario, watched, Some(nominal))[&Figure::Astray]
+    };
+    assert!((astray(&following(5e-3), &following(2e-3)) - 3.0).abs() < 1e-6);
+    assert_eq!(astray(&following(2e-3), &following(5e-3)), 0.0);
+    assert!(astray(&stopped(0.2), &following(2e-3)).is_nan(), "no plan was told");
+}
+
 /// The change that makes it fail: an arm that still moves as the watch ends counts as resting from then on.
 #[test]
 fn an_arm_that_still_moves_when_nobody_looks_any_more_does_not_rest() {
