@@ -65,8 +65,20 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             let share = if let Law::Lower(lowering) = &self.law { lowering.share } else { R::constant(1.0) };
             demand.torque.0 += push * share;
             demand.flags |= flags::NEAR_LIMIT;
+            self.press_no_further(measured, &mut demand);
         }
         Some(demand)
+    }
+
+    /// Takes from the force control what presses joints beyond their bounds further out.
+    #[cold]
+    #[inline(never)]
+    fn press_no_further(&mut self, measured: &Measured<'_, R>, demand: &mut Demand<R>) {
+        if let Law::Run(Running { pressing, .. }) = &mut self.law {
+            let outward = self.bounds.outward(&measured.state.q, pressing);
+            *pressing -= outward;
+            demand.torque.0 -= outward;
+        }
     }
 
     /// Torque that keeps joints within their bounds (N m). It damps what the model sees, as everything else does: at a

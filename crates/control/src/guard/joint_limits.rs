@@ -25,6 +25,9 @@ const RETURN_SPEED: f64 = 0.5;
 /// Damping while moving further out (N m s/rad).
 const DAMPING: [f64; JOINTS] = [15.0, 25.0, 4.5, 4.0, 0.22, 0.4, 0.06];
 
+/// Distance beyond a bound at which nothing presses a joint further out (rad).
+const UNPRESSED: f64 = 0.005;
+
 /// The bounds of the joints.
 #[derive(Clone, Copy, Debug)]
 pub struct JointBounds<R: Real> {
@@ -87,6 +90,17 @@ impl<R: Real> JointBounds<R> {
             }
         }
         JointTorques(torque)
+    }
+
+    /// The part of a torque (N m) that presses joints further out and that they are no longer to bear: all of it
+    /// `UNPRESSED` beyond a bound, nothing within.
+    pub fn outward(&self, q: &JointPositions<R>, torque: &Vector7<R>) -> Vector7<R> {
+        let (zero, one) = (R::constant(0.0), R::constant(1.0));
+        Vector7::from_fn(|joint, _| {
+            let torque = torque[joint];
+            let past = if torque > zero { q.0[joint] - self.max[joint] } else { self.min[joint] - q.0[joint] };
+            torque * at_most(at_least(past * R::constant(1.0 / UNPRESSED), zero), one)
+        })
     }
 }
 
@@ -159,6 +173,22 @@ mod tests {
             let violated = |angle| bounds.violated(&posture(&model, joint, angle));
             assert!(!violated(bounds.max[joint] + STOP_DISTANCE) && violated(bounds.max[joint] + 1.1 * STOP_DISTANCE));
             assert!(!violated(bounds.min[joint] - STOP_DISTANCE) && violated(bounds.min[joint] - 1.1 * STOP_DISTANCE));
+        }
+    }
+
+    #[test]
+    fn a_joint_beyond_its_bound_is_not_pressed_further_out_and_may_be_pressed_in() {
+        let model = model();
+        let bounds = JointBounds::around(&model, &middle(&model));
+        for joint in 0..JOINTS {
+            for (bound, outward) in [(bounds.min[joint], -1.0), (bounds.max[joint], 1.0)] {
+                for (out, share) in [(-0.1, 0.0), (0.5 * UNPRESSED, 0.5), (1.5 * UNPRESSED, 1.0)] {
+                    let q = posture(&model, joint, bound + out * outward);
+                    let borne = |torque: f64| bounds.outward(&q, &Vector7::repeat(torque * outward))[joint] * outward;
+                    assert!((borne(3.0) - 3.0 * share).abs() < 1e-9, "J{}: {} at {out}", joint + 1, borne(3.0));
+                    assert_eq!(borne(-3.0), 0.0, "J{} at {out}", joint + 1);
+                }
+            }
         }
     }
 

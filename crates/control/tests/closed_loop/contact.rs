@@ -377,3 +377,35 @@ fn a_plan_is_not_braked_for_long_by_a_force_that_swings() {
     println!("{:.1} mm, {:.1} mm where the force swings", free * 1e3, swinging * 1e3);
     assert!(swinging > 0.8 * free, "{swinging} m instead of {free} m");
 }
+
+/// Closing fingers that meet something push the hand aside, and Eq (12) gives way with it.
+///
+/// The change that makes it fail: force control presses a joint further out that is beyond its limit.
+#[test]
+fn b8_a_hand_that_gives_way_to_a_moment_rests_at_the_limit_of_its_wrist_and_is_not_stopped() {
+    for (limit, outward) in [(-1.52, -1.0), (1.52, 1.0)] {
+        let mut at = START;
+        at[5] = limit - 0.02 * outward;
+        let mut rig = holding::<f32>(at);
+        let design =
+            Design { start: at, goal: at, duration: 6.0, expected: Some([0.0; 6]), bent: false, ..Design::default() };
+        rig.load(&primitive(&design)).expect("loads");
+        rig.command(Command::Run(RunOptions {
+            compliant: true,
+            feedback: true,
+            force_control: true,
+            pose_feedback: PoseFeedback::Planned,
+            ..RunOptions::default()
+        }));
+        rig.run_for(0.5);
+        for torque in [0.1, 0.15, 0.2] {
+            let jacobian = rig.plant.frames().jacobian();
+            for axis in 0..3 {
+                rig.plant.push[3 + axis] = torque * outward * jacobian.0[(3 + axis, 5)];
+            }
+            rig.run_for(1.0);
+            println!("{torque} N m: J6 at {:.4}, {:?}", rig.plant.q[5], rig.cycle.fault());
+        }
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Run, Fault::None));
+    }
+}
