@@ -5,6 +5,7 @@
 //! | MODE of the safety module | 150 Hz | torque must end within 3 cycles of IDLE or E-STOP |
 //! | STAT of a puck that fell silent | 150 Hz, while it is silent | a puck that has reset must be found within 20 ms |
 //! | MODE of puck 1 | 10 Hz, up to 150 Hz when torque has ended | it brakes exactly while the safety module is IDLE |
+//! | MODE of every puck, in turn | 10 Hz, the one that brakes under an ACTIVE safety module out of turn | it does not pull, and nothing else tells |
 //! | PEN | 5 Hz | lights and warnings for a person |
 //! | MODE of each hand puck | 10 Hz, while there is a hand | a SET has no acknowledge, and others may set modes too |
 //! | TEMP | 1 Hz for each puck | heat |
@@ -26,6 +27,8 @@ const TEMPERATURE: PropertyId = match PropertyId::new(9) {
 /// Slow slots between two looks at MODE of puck 1. All offsets are odd and all periods multiples of 6, so that no two
 /// questions fall into one slot and the even slots stay with the safety module. Offsets 1, 7, 13.. are for modes.
 const PUCK_MODE: (u32, u32) = (30, 1);
+/// Slow slots between two looks at MODE of any puck of the arm; the seven pucks take turns.
+const EACH_MODE: (u32, u32) = (30, 15);
 /// Slow slots between two looks at MODE of a hand puck; the one of puck 1 falls into the same raster.
 const HAND_MODE: (u32, u32) = (6, 1);
 /// Slow slots between two looks at the pendant.
@@ -44,8 +47,8 @@ const REPEAT: u32 = 42 * 7 * 40;
 pub(crate) enum PollReply {
     /// MODE of the safety module.
     SafetyMode(i32),
-    /// MODE of puck 1.
-    PuckMode(i32),
+    /// MODE of a puck (0..=6).
+    PuckMode(usize, i32),
     /// The pendant word.
     Pendant(i32),
     /// TEMP of a puck (0..=6), degree Celsius.
@@ -97,14 +100,17 @@ impl BackgroundPoll {
         self.ask(first, PropertyId::MODE)
     }
 
-    /// The question whose turn it is, if there is one; `hand`: its pucks may be asked too.
-    pub(crate) fn other(&mut self, hand: bool, absent: (bool, bool)) -> Option<CanFrame> {
+    /// The question whose turn it is, if there is one; `hand`: its pucks may be asked too; `braking`: the puck (0..=6)
+    /// that is to be asked if it brakes, out of turn.
+    pub(crate) fn other(&mut self, hand: bool, absent: (bool, bool), braking: Option<usize>) -> Option<CanFrame> {
         let tick = self.tick;
         let due = |(period, offset): (u32, u32)| tick.checked_rem(period) == Some(offset);
         let turn = |period: u32, pucks: usize| (tick.checked_div(period)? as usize).checked_rem(pucks);
         let [first, ..] = Node::ARM;
         let (node, property) = if due(PUCK_MODE) {
             (first, PropertyId::MODE)
+        } else if due(EACH_MODE) {
+            (*Node::ARM.get(braking.or_else(|| turn(EACH_MODE.0, Node::ARM.len()))?)?, PropertyId::MODE)
         } else if hand && due(HAND_MODE) {
             // Of five places of the raster the first is that of puck 1, four remain for the four digits.
             let digit = (tick % PUCK_MODE.0 / HAND_MODE.0).checked_sub(1)?;
@@ -142,7 +148,7 @@ impl BackgroundPoll {
             TEMPERATURE if node.hand_index().is_some() => PollReply::HandTemperature(node.hand_index()?, value),
             TEMPERATURE if node != Node::SAFETY_MODULE => PollReply::Temperature(node.arm_index()?, value),
             PropertyId::MODE if node.hand_index().is_some() => PollReply::HandMode(node, value),
-            PropertyId::MODE if node != Node::SAFETY_MODULE => PollReply::PuckMode(value),
+            PropertyId::MODE if node != Node::SAFETY_MODULE => PollReply::PuckMode(node.arm_index()?, value),
             PropertyId::MODE => {
                 self.safety_silence = 0;
                 PollReply::SafetyMode(value)
@@ -174,7 +180,7 @@ mod tests {
         let mut poll = BackgroundPoll::new(&safety);
         let mut counts = BTreeMap::new();
         for _ in 0..control::RATE_HZ as usize * seconds {
-            if let Some(frame) = poll.begin().or_else(|| poll.other(hand, (false, false))) {
+            if let Some(frame) = poll.begin().or_else(|| poll.other(hand, (false, false), None)) {
                 let request = Request::decode(&frame).expect("a request");
                 let puck::Destination::Node(node) = request.to else { panic!("a poll to a group") };
                 let puck::Action::Get { property } = request.action else { panic!("a poll that sets") };
@@ -191,6 +197,9 @@ mod tests {
         let rate = |node: u8, property: u8| counts.get(&(node, property)).copied().unwrap_or(0) as f64 / 10.0;
         assert!(rate(10, 8) >= 100.0, "safety MODE");
         assert!(rate(1, 8) >= 10.0, "MODE of puck 1");
+        for node in 2..=7 {
+            assert!(rate(node, 8) >= 1.4, "MODE of puck {node}: {}", rate(node, 8));
+        }
         assert!(rate(10, 43) >= 5.0, "PEN");
         for node in 1..=7 {
             assert!(rate(node, 9) >= 1.0, "TEMP of puck {node}: {}", rate(node, 9));

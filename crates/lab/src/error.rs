@@ -173,6 +173,7 @@ fn explain(reason: Refusal, detail: [u32; 2]) -> String {
         Refusal::SafetyMode => match first {
             0 => format!("{reason}: it is in E-stop"),
             1 => format!("{reason}: it is idle"),
+            2 => format!("{reason}: it is active, and the motors brake; press Shift-Idle, then Shift-Activate"),
             _ => format!("{reason}: its mode is unknown"),
         },
         Refusal::BadValue => format!("{reason} (number {})", first.saturating_add(1)),

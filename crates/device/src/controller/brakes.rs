@@ -13,6 +13,10 @@ const LOOK_SLOTS: u16 = periods(0.5);
 /// carry positions again.
 const SECOND_WORDS: u16 = periods(0.1);
 
+/// Answers in a row of a braking puck under an ACTIVE safety module that mean IDLE: one may be older than the
+/// activation.
+const BRAKING_ANSWERS: u8 = 2;
+
 /// The requests to brake.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Brakes {
@@ -25,6 +29,8 @@ pub(super) struct Brakes {
     owed: bool,
     /// Puck 1 has told that it brakes since torque ended.
     braked: bool,
+    /// A puck (0..=6), and how many times in a row it told of its brakes under an ACTIVE safety module.
+    suspect: (usize, u8),
     /// Words left for the request slots.
     second_words: u16,
 }
@@ -39,15 +45,38 @@ impl Brakes {
         self.wanted = wanted;
     }
 
-    /// Puck 1 has told if it brakes.
-    pub(super) fn hear_puck(&mut self, braking: bool) {
-        self.pulling = !braking;
-        self.braked |= braking;
+    /// A puck (0..=6) has told if it brakes; `active`: while the safety module is ACTIVE.
+    pub(super) fn hear_puck(&mut self, puck: usize, braking: bool, active: bool) {
+        if puck == 0 {
+            self.pulling = !braking;
+            self.braked |= braking;
+        }
+        let (suspect, answers) = self.suspect;
+        match (braking && active, puck == suspect) {
+            (true, true) => self.suspect.1 = answers.saturating_add(1),
+            (true, false) if answers == 0 => self.suspect = (puck, 1),
+            (false, true) => self.suspect.1 = 0,
+            _ => {}
+        }
+    }
+
+    /// The puck (0..=6) that has told of its brakes under an ACTIVE safety module, if one has.
+    pub(super) fn suspect(&self) -> Option<usize> {
+        let (puck, answers) = self.suspect;
+        (answers > 0).then_some(puck)
     }
 
     /// The safety module has told its mode.
     pub(super) fn hear_safety(&mut self, mode: SafetyMode) {
+        if mode != SafetyMode::Active {
+            self.suspect.1 = 0;
+        }
         self.owed = core::mem::take(&mut self.pulling) && mode == SafetyMode::Idle;
+    }
+
+    /// True if a puck brakes although the safety module says that it is ACTIVE: its word to them was lost.
+    pub(super) fn are_on_under_active(&self) -> bool {
+        self.suspect.1 >= BRAKING_ANSWERS
     }
 
     /// One slow slot: what has to leave in it. `mode` is that of the safety module, `writable` says that it takes one.
@@ -60,7 +89,12 @@ impl Brakes {
             _ => self.look_slots.saturating_sub(1),
         };
         // Asked for even of a module that has told IDLE: the word may be wrong, and then nothing brakes.
-        if self.wanted && writable && self.request_in == 0 && mode != Some(SafetyMode::EStop) {
+        // Of one that is ACTIVE while a puck brakes too: it has to go down to them before a person can raise both.
+        if (self.wanted || self.are_on_under_active())
+            && writable
+            && self.request_in == 0
+            && mode != Some(SafetyMode::EStop)
+        {
             self.request_in = REQUEST_SLOTS;
             return Some(set(Node::SAFETY_MODULE, PropertyId::MODE, SafetyMode::Idle.value()));
         }

@@ -52,9 +52,6 @@ const SAFETY_SILENCE: u16 = periods(0.1) / 2;
 const LAST_CYCLES: u8 = 6;
 /// Cycles in a row whose torque frames could not be sent, after which the bus counts as failed.
 const REFUSED_CYCLES: u8 = 6;
-/// Answers in a row of a braking puck 1 under an ACTIVE safety module that mean IDLE: one may be older than the
-/// activation.
-const BRAKING_ANSWERS: u8 = 2;
 
 /// Who has the bus.
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +86,6 @@ pub struct DeviceController {
     /// A fault of the bus, to be told to the next cycle, and the cycles left until the bus is started anew.
     fault: Option<Fault>,
     last_cycles: Option<u8>,
-    braking: u8,
     refused: u8,
     lateness: Lateness,
     brakes: Brakes,
@@ -119,7 +115,6 @@ impl DeviceController {
             blocked: None,
             fault: None,
             last_cycles: None,
-            braking: 0,
             refused: 0,
             lateness: Lateness::default(),
             brakes: Brakes::default(),
@@ -190,11 +185,10 @@ impl DeviceController {
         };
         match reply {
             PollReply::SafetyMode(value) => self.hear_safety(value, io),
-            PollReply::PuckMode(value) => {
+            PollReply::PuckMode(puck, value) => {
                 let braking = MotorMode::from_value(value) == Some(MotorMode::Idle);
                 let active = self.safety_mode == Some(SafetyMode::Active);
-                self.braking = if braking && active { self.braking.saturating_add(1) } else { 0 };
-                self.brakes.hear_puck(braking);
+                self.brakes.hear_puck(puck, braking, active);
             }
             PollReply::Pendant(value) => self.pendant = Some(value),
             PollReply::Temperature(joint, value) => {
@@ -225,7 +219,6 @@ impl DeviceController {
         self.brakes.hear_safety(mode);
         if self.safety_mode != Some(mode) {
             self.safety_mode = Some(mode);
-            self.braking = 0;
             self.tell(EventKind::Safety(mode), io);
         }
     }
@@ -281,7 +274,7 @@ impl DeviceController {
             self.cycle.forget_tare();
         }
         (self.fault, self.last_cycles, self.fresh_safety) = (None, None, None);
-        (self.braking, self.refused) = (0, 0);
+        self.refused = 0;
         self.lateness = Lateness::default();
         self.brakes = Brakes::default();
     }
@@ -381,7 +374,7 @@ impl DeviceController {
     /// Mode of the safety module for the cycle: the one it told itself, unless a braking puck contradicts.
     fn safety_of_cycle(&mut self) -> Option<SafetyMode> {
         let told = self.fresh_safety.take();
-        if self.braking >= BRAKING_ANSWERS { Some(SafetyMode::Idle) } else { told }
+        if self.brakes.are_on_under_active() { Some(SafetyMode::Idle) } else { told }
     }
 
     /// Both frames of the cycle, or zeros: pucks keep their last torque until they are told another.
@@ -458,7 +451,7 @@ impl DeviceController {
             (None, Some(node)) => Some(poll.suspect(node)),
             (None, None) if self.hand.act(&mut outlet) => None,
             (None, None) if self.brakes.look(self.safety_mode) => Some(poll.first_mode()),
-            (None, None) => poll.other(self.hand.answers_questions(), self.startup.absent()),
+            (None, None) => poll.other(self.hand.answers_questions(), self.startup.absent(), self.brakes.suspect()),
         };
         if let Some(frame) = question {
             outlet.send(frame);

@@ -153,13 +153,28 @@ fn a15_idle_ends_torque_within_three_cycles() {
     }
 }
 
+/// The changes that make it fail: puck 1 alone is asked; the safety module is left ACTIVE.
 #[test]
-fn braking_pucks_under_an_active_safety_module_count_as_idle() {
-    let (mut core, mut bus) = floating();
-    bus.pucks[0].mode = puck::MotorMode::Idle;
-    bus.run(&mut core, 0.4);
-    assert_ne!(core.health().state, State::Gravity);
-    assert!(!core.health().state.has_torque());
+fn a_puck_that_brakes_under_an_active_safety_module_ends_torque_and_both_are_raised_again_by_a_person() {
+    for puck in 0..7 {
+        let (mut core, mut bus) = floating();
+        bus.pucks[puck].mode = puck::MotorMode::Idle;
+        let begin = bus.now_us;
+        while core.health().state.has_torque() {
+            bus.run_slots(&mut core, 1);
+            assert!(bus.now_us - begin < 1_000_000, "puck {}: {:?}", puck + 1, core.health().state);
+        }
+        println!("puck {}: {} ms", puck + 1, (bus.now_us - begin) / 1000);
+        bus.run(&mut core, 0.2);
+        assert_eq!(bus.safety_mode, puck::SafetyMode::Idle, "it goes down to the pucks");
+        assert_eq!(core.stage(), Stage::WaitingForActive);
+        bus.press_activate();
+        bus.pucks.iter_mut().for_each(|puck| puck.mode = puck::MotorMode::Torque);
+        bus.run(&mut core, 0.2);
+        bus.commands.push_back(Command::Gravity.into());
+        bus.run(&mut core, 2.0);
+        assert_eq!(core.health().state, State::Gravity, "puck {}: {:?}", puck + 1, bus.events);
+    }
 }
 
 #[test]
