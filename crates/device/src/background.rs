@@ -5,7 +5,7 @@
 //! | MODE of the safety module | 150 Hz | torque must end within 3 cycles of IDLE or E-STOP |
 //! | STAT of a puck that fell silent | 150 Hz, while it is silent | a puck that has reset must be found within 20 ms |
 //! | MODE of puck 1 | 10 Hz, up to 150 Hz when torque has ended | it brakes exactly while the safety module is IDLE |
-//! | MODE of every puck, in turn | 10 Hz, the one that brakes under an ACTIVE safety module out of turn | it does not pull, and nothing else tells |
+//! | MODE of every puck, in turn | 10 Hz; one that brakes under an ACTIVE module out of turn | it does not pull |
 //! | PEN | 5 Hz | lights and warnings for a person |
 //! | MODE of each hand puck | 10 Hz, while there is a hand | a SET has no acknowledge, and others may set modes too |
 //! | TEMP | 1 Hz for each puck | heat |
