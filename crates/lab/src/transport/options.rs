@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use super::AddressError;
+use super::address::SimulatorKind;
 
 /// The line of the host link of a simulated device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -82,13 +83,24 @@ impl Cancellation {
 }
 
 impl SimulatorOptions {
-    /// Reads `seed=7,world=simple`; `is_board`: the options of the emulated board are allowed.
+    /// Reads `seed=7,world=simple` for a device of this kind.
     ///
     /// # Errors
-    /// [`AddressError`] for an option or a value that there is not.
-    pub(super) fn parse(text: &str, is_board: bool) -> Result<Self, AddressError> {
+    /// [`AddressError`] for an option or a value that there is not, and for an option that is given twice.
+    pub(super) fn parse(text: &str, kind: SimulatorKind) -> Result<Self, AddressError> {
+        let is_board = kind == SimulatorKind::Board;
         let mut options = Self::default();
+        let mut given: Vec<&str> = Vec::new();
         for part in text.split(',').filter(|part| !part.is_empty()) {
+            let name = part.split_once('=').map_or(part, |(name, _)| name);
+            // Several faults befall one chip.
+            if name != "fault" && given.contains(&name) {
+                return Err(AddressError::Twice(name.to_owned()));
+            }
+            given.push(name);
+            if kind == SimulatorKind::Hand && ["arm", "held", "flash", "faults"].contains(&name) {
+                return Err(AddressError::HandOption(part.to_owned()));
+            }
             match part.split_once('=').filter(|(_, value)| !value.is_empty()) {
                 Some(("seed", value)) => {
                     options.seed = Some(value.parse().map_err(|_| AddressError::Number(format!("seed={value}")))?);
