@@ -353,3 +353,26 @@ fn a_place_where_no_arm_can_be_served_is_told_with_those_where_one_can() {
         assert!(help.contains(remedy), "{option}: {help}");
     }
 }
+
+/// A newcomer leaves out the ending, or expects that a simulated device remembers the last command.
+#[test]
+fn a_primitive_that_is_not_there_is_named_with_the_place_where_it_may_be() {
+    let folder = learned();
+    let at = folder.path();
+    for line in ["upload reach", "check reach", "rehearse reach"] {
+        let (exit, code, message, help) = refused(at, &format!("{DEVICE} {line}"));
+        assert!(exit == 2 && code == "E233" && message.contains("reach: "), "{line}: {code}: {message}");
+        assert_eq!(help, "there is a file reach.toml", "{line}");
+    }
+    for line in ["run reach", "get reach -o a.toml", "delete reach", "rename reach grasp"] {
+        let (exit, code, message, help) = refused(at, &format!("{DEVICE} {line}"));
+        assert!(exit == 5 && code == "E513" && message.contains("'reach'"), "{line}: {code}: {message}");
+        assert!(help.contains("`tactus upload reach.toml`"), "{line}: {help}");
+    }
+    for line in ["run grasp", "delete grasp"] {
+        let (_, _, message, help) = refused(at, &format!("{DEVICE} {line}"));
+        assert!(message.contains("'grasp'") && help.contains("`flash=FILE`"), "{line}: {message}: {help}");
+        let (_, _, _, help) = refused(at, &format!("--device sil:world=simple,flash=arm.flash {line}"));
+        assert!(help.contains("`tactus list`"), "{line}: {help}");
+    }
+}

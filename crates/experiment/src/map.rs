@@ -81,7 +81,7 @@ pub fn short(value: f64) -> String {
     if value.fract().abs() < 1e-9 { format!("{value:.0}") } else { format!("{value:.1}") }
 }
 
-/// What nobody could measure is a dash.
+/// Words on a value; a dash for one that nobody could measure.
 fn or_none<T>(value: Option<T>, words: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| "-".to_owned(), words)
 }

@@ -79,8 +79,8 @@ impl Trace {
         if touched >= FREE_SECONDS { self.sag(touched - FREE_SECONDS, touched) } else { None }
     }
 
-    /// Content above 3 Hz of the force at the wrist between two times, N: root mean square of the vector. `None` without
-    /// a cycle between them.
+    /// Content above 3 Hz of the force at the wrist between two times, N: root mean square of the vector; `None`
+    /// without a cycle between them.
     pub fn chatter(&self, from: f64, to: f64) -> Option<f64> {
         let before = self.cycles.partition_point(|cycle| cycle.time < from);
         let within = self.cycles.partition_point(|cycle| cycle.time < to).saturating_sub(before);

@@ -73,6 +73,10 @@ pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Fa
             let help = format!("`tactus rehearse {}` records an expectation; then gather them again", path.display());
             return Failure::new(ErrorCode::NoExpectation, refused, cause).help(help);
         }
+        PrimitiveFileError::Io { .. } if !path.exists() && path.with_extension("toml").is_file() => {
+            let help = format!("there is a file {}", path.with_extension("toml").display());
+            return Failure::of_file(ErrorCode::PrimitiveUnreadable, refused, cause).help(help);
+        }
         PrimitiveFileError::Syntax { .. } if Recording::read(path).is_ok() => {
             let help = format!("this is a recording: `tactus learn {}` makes a primitive of it", path.display());
             return Failure::new(ErrorCode::PrimitiveUnreadable, refused, cause).help(help);

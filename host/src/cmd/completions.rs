@@ -20,7 +20,7 @@ pub struct Cmd {
 pub struct Completing {
     /// The shell.
     pub shell: String,
-    /// What that shell reads.
+    /// Text that this shell reads.
     pub script: String,
 }
 

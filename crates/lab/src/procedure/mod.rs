@@ -91,7 +91,7 @@ pub enum ProcedureError {
     /// Neither a force sensor nor the gauges of a hand tell anything.
     #[error("there is no force sensor, and {}: there is nothing to tare", without_hand(*.hand))]
     NothingToTare {
-        /// How far the hand is.
+        /// Stage of the hand.
         hand: HandStage,
     },
     /// A fault is latched.

@@ -20,21 +20,8 @@ use std::str::FromStr;
 use link::can::DeviceNumber;
 
 use super::AddressError;
-use super::options::SimulatorOptions;
+use super::options::{SimulatorKind, SimulatorOptions};
 use super::serial::DEFAULT_BAUD;
-
-/// Which simulated device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SimulatorKind {
-    /// `sim:`, the firmware image under QEMU.
-    Qemu,
-    /// `sil:`, the application in this process.
-    InProcess,
-    /// `hand:`, the hand image under QEMU: a hand alone on its bus.
-    Hand,
-    /// `board:`, the image for the STM32H743 on the emulated board.
-    Board,
-}
 
 /// Where a device is.
 #[derive(Debug, Clone, PartialEq, Eq)]

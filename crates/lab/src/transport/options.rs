@@ -4,7 +4,19 @@ use std::fmt;
 use std::path::PathBuf;
 
 use super::AddressError;
-use super::address::SimulatorKind;
+
+/// Which simulated device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SimulatorKind {
+    /// `sim:`, the firmware image under QEMU.
+    Qemu,
+    /// `sil:`, the application in this process.
+    InProcess,
+    /// `hand:`, the hand image under QEMU: a hand alone on its bus.
+    Hand,
+    /// `board:`, the image for the STM32H743 on the emulated board.
+    Board,
+}
 
 /// The line of the host link of a simulated device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
