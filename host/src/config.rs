@@ -82,6 +82,10 @@ impl Config {
             Err(error) => return Err(failure(error.to_string())),
         };
         let config: Self = toml::from_str(&text).map_err(|error| failure(error.to_string()))?;
+        let texts = [("device", &config.device), ("secret_file", &config.secret_file)];
+        if let Some((name, _)) = texts.into_iter().find(|(_, text)| text.as_ref().is_some_and(String::is_empty)) {
+            return Err(failure(format!("{name} = \"\": it is empty; give it a value, or leave out the line")));
+        }
         // The same rule as for the option: its default is checked by nobody else.
         if let Some((timeout, Err(cause))) = config.timeout.map(|timeout| (timeout, seconds(&timeout.to_string()))) {
             return Err(failure(format!("timeout = {timeout}: {cause}")));
@@ -136,13 +140,13 @@ impl Config {
     }
 }
 
-/// The variable with a time-out, if its value is none: what it says, and the command line without it.
+/// The variable with a time-out, if its value is none: what is wrong with it, and the command line without it.
 #[must_use]
 pub fn without_wrong_timeout(command: Command) -> Option<(String, Command)> {
     let value = std::env::var_os(TIMEOUT_VARIABLE)?;
     let cause = value.to_str().map_or(Err("it is no Unicode".to_owned()), seconds).err()?;
     let command = command.mut_arg("timeout", |argument| argument.env(Resettable::Reset));
-    Some((format!("{TIMEOUT_VARIABLE} is ignored: {cause}"), command))
+    Some((cause, command))
 }
 
 /// Shortest time that a setting may ask for: no line answers sooner.

@@ -7,9 +7,9 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 
 use crate::cmd::{
-    calibrate, can, config, delete, doctor, experiment, explain, export, faults, flash, friction, get, hand, learn,
-    list, manual, payload, plot, record, rehearse, rename, report, run_report, secret, settings, sim, statistics,
-    status, stop, teach, upload, weigh,
+    calibrate, can, completions, config, delete, doctor, experiment, explain, export, faults, flash, friction, get,
+    hand, learn, list, manual, payload, plot, record, rehearse, rename, report, run_report, secret, settings, sim,
+    statistics, status, stop, teach, upload, weigh,
 };
 use crate::monitor;
 
@@ -28,6 +28,7 @@ pub fn all() -> Vec<(&'static str, Schema)> {
         ("can-replay", of::<lab::replay::Outcome>()),
         ("check", of::<crate::check::CheckReport>()),
         ("compare", of::<lab::difference::Difference>()),
+        ("completions", of::<completions::Completing>()),
         ("config", of::<config::Configured>()),
         ("config-diff", of::<settings::Compared>()),
         ("config-get", of::<settings::Kept>()),

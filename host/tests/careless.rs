@@ -204,3 +204,175 @@ fn a_recording_that_could_not_be_read_again_is_not_made() {
     }
     assert!(!at.join("a.csv").exists());
 }
+
+#[test]
+fn what_is_given_twice_is_refused_because_one_of_the_two_would_be_ignored() {
+    let folder = learned();
+    let at = folder.path();
+    for (line, code, words) in [
+        ("--device sil:seed=1,seed=2 status", "E201", "'seed' is given twice"),
+        ("--device sil:world=simple,flash=a.flash sim --flash b.flash", "E201", "'flash' is given twice"),
+        ("--device sil:world=simple,faults=a.toml sim --faults b.toml", "E201", "'faults' is given twice"),
+        ("--device sil:world=simple,bus=a.log run reach.toml --bus-log b.log", "E200", "`--bus-log` and `bus=`"),
+        (
+            "--device sil:world=simple config set home.joint_1_rad=0.1 home.joint_1_rad=0.2",
+            "E238",
+            "'home.joint_1_rad' is given twice",
+        ),
+        ("--device sil:world=simple experiment cup --vary mass=1.1,mass=1.2", "E200", "mass is given twice"),
+        ("--device sil: --device sim: status", "E200", "cannot be used multiple times"),
+    ] {
+        let (exit, found, message, help) = refused(at, line);
+        assert!(exit == 2 && found == code && message.contains(words), "{line}: {exit} {found}: {message}");
+        assert!(!help.is_empty(), "{line}");
+    }
+    assert!(!at.join("a.log").exists() && !at.join("b.log").exists() && !at.join("a.flash").exists());
+}
+
+#[test]
+fn a_file_of_another_kind_is_named_once_and_the_help_says_what_it_is_good_for() {
+    let folder = learned();
+    let at = folder.path();
+    std::fs::write(at.join("nil"), "").unwrap();
+    std::fs::create_dir(at.join("nest")).unwrap();
+    for (line, file) in [
+        ("check nil", "nil"),
+        ("check demo.csv", "demo.csv"),
+        ("check nowhere.toml", "nowhere.toml"),
+        ("check nest", "nest"),
+        ("learn nil -o a.toml", "nil"),
+        ("learn nest", "nest"),
+        ("learn reach.toml -o a.toml", "reach.toml"),
+        ("plot -p demo.csv -o a.svg", "demo.csv"),
+        ("plot -d nil -o a.svg", "nil"),
+        ("report reach.toml -o a.html", "reach.toml"),
+        ("export reach.toml -o a.mcap", "reach.toml"),
+        ("compare demo.csv nil", "nil"),
+        ("can decode nowhere.log", "nowhere.log"),
+        ("can replay nest", "nest"),
+        ("--device sil:world=simple upload demo.csv", "demo.csv"),
+        ("--device sil:world=simple run demo.csv", "demo.csv"),
+        ("--device sil:world=simple rehearse demo.csv", "demo.csv"),
+        ("--device sil:world=simple config restore nil", "nil"),
+        ("--device sil:world=simple config diff nest", "nest"),
+        ("--device sil:world=simple secret set nil", "nil"),
+        ("--device sil:world=simple,faults=nil status", "nil"),
+        ("--device sil:world=simple,faults=nest status", "nest"),
+        ("--device sil:world=simple,flash=demo.csv status", "demo.csv"),
+        ("statistics demo.csv reach.toml", "demo.csv"),
+        ("flash --dry-run --image demo.csv", "demo.csv"),
+        ("secret new demo.csv", "demo.csv"),
+    ] {
+        let (_, code, message, help) = refused(at, line);
+        assert_eq!(message.matches(file).count(), 1, "{line}: {code}: {message}");
+        assert!(!help.is_empty(), "{line}: {code}: {message}");
+        if line.contains("demo.csv") && ["E630", "E610"].contains(&code.as_str()) {
+            assert!(help.contains("this is a recording: `tactus learn demo.csv`"), "{line}: {help}");
+        }
+    }
+}
+
+#[test]
+fn results_that_are_not_there_leave_no_folder_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (_, code, ..) = refused(at, "experiment cup --figures-only");
+    assert!(["E242", "E310"].contains(&code.as_str()), "{code}");
+    assert_eq!(std::fs::read_dir(at).unwrap().count(), 0);
+    for (line, words) in [("--rotate nan", "degrees"), ("--shift 1e9,0", "100 cm"), ("--learn-speed 0", "0.1 to 10")] {
+        let (_, code, message, _) = refused(at, &format!("experiment cup {line}"));
+        assert!(code == "E200" && message.contains(words), "{line}: {message}");
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_setting_is_told_by_the_place_where_it_was_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let file = at.join("tactus/config.toml");
+    std::fs::create_dir(at.join("tactus")).unwrap();
+    for (text, words) in [
+        ("device = \"sil:\"\ndevice = \"sim:\"", "duplicate key"),
+        ("devise = \"sil:\"", "unknown field `devise`"),
+        ("secret_file = \"\"", "secret_file = \"\""),
+        ("device = \"\"", "device = \"\""),
+        ("timeout = nan", "timeout = NaN"),
+    ] {
+        std::fs::write(&file, text).unwrap();
+        let (exit, code, message, help) = refused(at, "list");
+        assert!(exit == 2 && code == "E250" && message.contains(words), "{text}: {code}: {message}");
+        assert!(message.contains("tactus/config.toml") && !help.is_empty(), "{text}: {message}");
+    }
+    std::fs::remove_file(&file).unwrap();
+    let run = |line: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+        command.current_dir(at).env("XDG_CONFIG_HOME", at).env("TACTUS_TIMEOUT", "2,5").args(line.split_whitespace());
+        command.stdin(Stdio::null()).output().unwrap()
+    };
+    let output = run(&format!("{DEVICE} list"));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        said.starts_with("error[E200]: TACTUS_TIMEOUT: `2,5`") && said.contains("  help: correct TACTUS_TIMEOUT"),
+        "{said}"
+    );
+    assert_eq!(output.status.code(), Some(2));
+    assert!(run(&format!("{DEVICE} --timeout 2 list")).status.success());
+    assert!(run(&format!("{DEVICE} stop")).status.success());
+}
+
+#[test]
+fn degrees_and_absurd_numbers_are_told_as_such_on_one_line() {
+    let folder = learned();
+    let at = folder.path();
+    let (_, code, message, _) = refused(at, "learn demo.csv -o a.toml --hand-goal 0,90,90,90");
+    assert!(code == "E200" && message.contains("90 rad: are these degrees?"), "{message}");
+    let text = std::fs::read_to_string(at.join("demo.csv")).unwrap();
+    let line = text.lines().nth(50).unwrap();
+    let mut fields: Vec<&str> = line.split(',').collect();
+    let joint = text.lines().find(|line| line.contains("q1_rad")).unwrap().split(',').position(|name| name == "q1_rad");
+    fields[joint.unwrap()] = "1e300";
+    std::fs::write(at.join("absurd.csv"), text.replace(line, &fields.join(","))).unwrap();
+    let (_, code, message, _) = refused(at, "learn absurd.csv -o a.toml");
+    assert!(code == "E621" && message.contains("1.0e300 rad: are these degrees?"), "{code}: {message}");
+    let (_, code, _, help) = refused(at, "learn demo.csv -o a.toml --dwell -1");
+    assert!(code == "E221" && help.contains("tactus learn --help"), "{code}: {help}");
+}
+
+#[test]
+fn a_place_where_no_arm_can_be_served_is_told_with_those_where_one_can() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (option, words, remedy) in [
+        ("--listen foo", "listen on unix:PATH or tcp:HOST:PORT", "--listen"),
+        ("--listen sil:", "listen on unix:PATH or tcp:HOST:PORT", "--listen"),
+        ("--listen tcp:localhost:99999", "'99999'", "--listen"),
+        ("--can-only --can foo", "foo", "`--can 127.0.0.1:29536`"),
+    ] {
+        let (exit, code, message, help) = refused(at, &format!("--device sil:world=simple sim --duration 1 {option}"));
+        assert!(exit == 3 && code == "E320" && message.contains(words), "{option}: {code}: {message}");
+        assert!(help.contains(remedy), "{option}: {help}");
+    }
+}
+
+/// A newcomer leaves out the ending, or expects that a simulated device remembers the last command.
+#[test]
+fn a_primitive_that_is_not_there_is_named_with_the_place_where_it_may_be() {
+    let folder = learned();
+    let at = folder.path();
+    for line in ["upload reach", "check reach", "rehearse reach"] {
+        let (exit, code, message, help) = refused(at, &format!("{DEVICE} {line}"));
+        assert!(exit == 2 && code == "E233" && message.contains("reach: "), "{line}: {code}: {message}");
+        assert_eq!(help, "there is a file reach.toml", "{line}");
+    }
+    for line in ["run reach", "get reach -o a.toml", "delete reach", "rename reach grasp"] {
+        let (exit, code, message, help) = refused(at, &format!("{DEVICE} {line}"));
+        assert!(exit == 5 && code == "E513" && message.contains("'reach'"), "{line}: {code}: {message}");
+        assert!(help.contains("`tactus upload reach.toml`"), "{line}: {help}");
+    }
+    for line in ["run grasp", "delete grasp"] {
+        let (_, _, message, help) = refused(at, &format!("{DEVICE} {line}"));
+        assert!(message.contains("'grasp'") && help.contains("`flash=FILE`"), "{line}: {message}: {help}");
+        let (_, _, _, help) = refused(at, &format!("--device sil:world=simple,flash=arm.flash {line}"));
+        assert!(help.contains("`tactus list`"), "{line}: {help}");
+    }
+}

@@ -233,6 +233,12 @@ fn a_disk_that_fills_up_is_named_as_such_and_keeps_what_fits() {
         .code(2);
     assert!(stderr(&limited).starts_with("error[E235]"), "{}", stderr(&limited));
     assert_eq!(names(at), ["demo.csv", "reach.toml", "run.csv"]);
+    // Half a flash would be refused for its size as long as it is there.
+    let line = "ulimit -f 300; exec \"$0\" --device sil:world=simple,flash=arm.flash list";
+    let program = env!("CARGO_BIN_EXE_tactus");
+    let limited = Command::new("bash").current_dir(at).args(["-c", line, program]).assert().failure().code(2);
+    assert!(stderr(&limited).starts_with("error[E235]"), "{}", stderr(&limited));
+    tactus(at, "--device sil:world=simple,flash=arm.flash list").success();
     tactus(at, "check reach.toml").success();
 }
 
@@ -253,6 +259,21 @@ fn a_closed_pipe_and_a_full_output_are_no_crash() {
             assert_eq!((code, said.as_str()), (Some(0), ""), "{line}");
         }
         run(&format!("{line} 2>&1 | true"));
+    }
+    // All of it is read, or the first line alone, or none of it can be written.
+    let lines =
+        ["--help", "--version", "learn --help", "--help-all", "-V", "completions zsh", "explain E504", "config"];
+    for line in lines.into_iter().chain(["--json completions fish", "--json explain E504", "can decode empty.log"]) {
+        std::fs::write(folder.path().join("empty.log"), "").unwrap();
+        let line = format!("\"$0\" {line}");
+        assert_eq!(run(&format!("{line} >/dev/null")), (Some(0), String::new()), "{line}");
+        let (code, said) = run(&format!("{line} | head -1 >/dev/null"));
+        assert_eq!((code, said.as_str()), (Some(0), ""), "{line}");
+        let (code, said) = run(&format!("{line} >/dev/full"));
+        assert!(
+            code == Some(2) && said.contains("E235") && said.contains("standard output"),
+            "{line}: {code:?} {said}"
+        );
     }
     assert_eq!(run("\"$0\" --json check no.toml | true").0, Some(2));
     assert_eq!(run("\"$0\" --json check no.toml >/dev/full").0, Some(2));

@@ -68,6 +68,9 @@ fn cli_18_shells_complete_every_command() {
     for shell in ["bash", "zsh", "fish"] {
         let text = stdout(&tactus(folder.path(), &["completions", shell]).success());
         assert!(["monitor", "rename", "explain"].iter().all(|word| text.contains(word)), "{shell}");
+        let told = stdout(&tactus(folder.path(), &["completions", "--json", shell]).success());
+        let told: serde_json::Value = serde_json::from_str(&told).expect("one object and nothing else");
+        assert_eq!((told["shell"].as_str(), told["script"].as_str()), (Some(shell), Some(text.as_str())));
     }
 }
 

@@ -18,12 +18,14 @@ pub struct Carried {
     pub trials: usize,
     /// Trials in which it was held.
     pub held: usize,
-    /// Distance of the hand below its plan when it has lifted, m: median over the trials.
-    pub sag_median_m: f64,
+    /// Distance of the hand below its plan when it has lifted, m: median over the trials; `null` where every arm
+    /// stopped before.
+    pub sag_median_m: Option<f64>,
     /// The same, the worst trial.
-    pub sag_max_m: f64,
-    /// Distance of the free hand below or above its plan before it touches the weight, m: median over the trials.
-    pub free_sag_median_m: f64,
+    pub sag_max_m: Option<f64>,
+    /// Distance of the free hand below or above its plan before it touches the weight, m: median over the trials;
+    /// `null` where no hand was free for a second.
+    pub free_sag_median_m: Option<f64>,
     /// The same, the worst trial.
-    pub free_sag_max_m: f64,
+    pub free_sag_max_m: Option<f64>,
 }

@@ -37,7 +37,8 @@ const CONTACT: Quantity = Quantity {
     unit: "N",
     scale: 1.0,
     bar: 0.5,
-    value: |measures| measures.contact_mean_n,
+    // Where nothing is touched no force acts.
+    value: |measures| measures.contact_mean_n.unwrap_or(0.0),
 };
 const TABLE: Quantity = Quantity {
     name: "force of the hand on the table",
@@ -65,12 +66,12 @@ pub struct Ratio {
     pub bar: f64,
     /// Share of the trials in which it does.
     pub below: f64,
-    /// Median of the ratio.
-    pub median: f64,
+    /// Median of the ratio; `None` where every arm stopped, and there is none.
+    pub median: Option<f64>,
     /// Its largest value.
-    pub max: f64,
+    pub max: Option<f64>,
     /// Median in open loop and with adaptation, SI.
-    pub medians: [f64; 2],
+    pub medians: [Option<f64>; 2],
     /// Ratio of each trial that is compared: cell, seed, ratio.
     pub trials: Vec<(String, u64, f64)>,
 }
@@ -114,7 +115,7 @@ impl Comparison {
         };
         let ratios = quantities.iter().map(|quantity| {
             let values: Vec<f64> = pairs.iter().map(|pair| ratio(quantity, pair)).collect();
-            let median = |values: &[f64]| quantile(values, 0.5).unwrap_or(0.0);
+            let median = |values: &[f64]| quantile(values, 0.5);
             let of = |pick: fn(&(&Report, &Report)) -> Measures| {
                 median(&pairs.iter().map(|pair| (quantity.value)(&pick(pair))).collect::<Vec<_>>())
             };
@@ -123,7 +124,7 @@ impl Comparison {
                 bar: quantity.bar,
                 below: share(values.iter().filter(|value| **value < quantity.bar).count()),
                 median: median(&values),
-                max: values.iter().copied().fold(0.0, f64::max),
+                max: quantile(&values, 1.0),
                 medians: [of(|(open, _)| open.measures), of(|(_, adapted)| adapted.measures)],
                 trials: pairs
                     .iter()
@@ -163,14 +164,16 @@ impl fmt::Display for Comparison {
             if self.stopped == 0 { String::new() } else { format!(", {} of them stopped in (c)", self.stopped) };
         writeln!(formatter, "(c) relative to (a), {} pairs of trials{stopped}{left_out}", self.pairs)?;
         for ratio in &self.ratios {
+            let measured = match (ratio.median, ratio.max) {
+                (Some(median), Some(max)) => format!("median {median:.2}, largest {max:.2}"),
+                _ => "median not measured".to_owned(),
+            };
             writeln!(
                 formatter,
-                "  {}: below {:.2} of (a) in {:.0} % of the pairs; median {:.2}, largest {:.2}",
+                "  {}: below {:.2} of (a) in {:.0} % of the pairs; {measured}",
                 ratio.name,
                 ratio.bar,
                 100.0 * ratio.below,
-                ratio.median,
-                ratio.max
             )?;
         }
         if self.ratios.len() > 1 {
@@ -192,11 +195,11 @@ mod tests {
         for report in &mut results.reports {
             let adapted = report.key.mode == Mode::Adaptive;
             report.measures.push_m = if adapted { 0.01 } else { 0.04 };
-            report.measures.contact_mean_n = match (adapted, report.key.index) {
+            report.measures.contact_mean_n = Some(match (adapted, report.key.index) {
                 (false, _) => 10.0,
                 (true, 1) => 6.0,
                 (true, _) => 4.0,
-            };
+            });
             if report.key.index == 0 && !adapted {
                 report.measures.touch_s = None;
             }
@@ -204,7 +207,7 @@ mod tests {
         let comparison = Comparison::of(&results, Scenario::Cup).unwrap();
         assert_eq!((comparison.pairs, comparison.left_out), (47, 1));
         assert_eq!(comparison.ratios[0].below, 1.0);
-        assert!((comparison.ratios[0].median - 0.25).abs() < 1e-12);
+        assert!((comparison.ratios[0].median.unwrap() - 0.25).abs() < 1e-12);
         assert!((comparison.all_below - 46.0 / 47.0).abs() < 1e-12, "one cell is touched too hard");
         let text = comparison.to_string();
         assert!(text.contains("1 is left out") && text.contains("median 0.40, largest 0.60"), "{text}");
@@ -225,6 +228,9 @@ mod tests {
         assert_eq!((comparison.pairs, comparison.all_below), (48, 0.0));
         assert_eq!((comparison.ratios[0].below, comparison.ratios[0].trials.len()), (0.0, 0));
         assert!(comparison.to_string().contains("48 of them stopped"), "{comparison}");
+        let ratio = &comparison.ratios[0];
+        assert_eq!((ratio.median, ratio.max, ratio.medians), (None, None, [None, None]), "nothing was measured");
+        assert!(comparison.to_string().contains("median not measured"), "{comparison}");
     }
 
     #[test]

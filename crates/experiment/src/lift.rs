@@ -83,19 +83,21 @@ pub fn carried(case: Case, results: &Results, mass: f64) -> Vec<Carried> {
     let usual = mass * ObjectSpec::new(ObjectKind::Weight).mass;
     let [remembered_kg, carried_kg] = case.factors().map(|factor| factor * usual);
     let of_mode = |mode| {
-        let sags: Vec<f64> = results.of(mode).map(|report| report.sag_m).collect();
+        // An arm that stopped has lifted nothing; earlier versions wrote a sag of 0 for it.
+        let went_on = results.of(mode).filter(|report| !report.outcome.is_stopped());
+        let sags: Vec<f64> = went_on.filter_map(|report| report.sag_m).collect();
         let free: Vec<f64> = results.of(mode).filter_map(|report| report.free_sag_m).map(f64::abs).collect();
         Carried {
             case: case.name(),
             remembered_kg,
             carried_kg,
             mode,
-            trials: sags.len(),
+            trials: results.of(mode).count(),
             held: results.of(mode).filter(|report| report.outcome.is_success()).count(),
-            sag_median_m: quantile(&sags, 0.5).unwrap_or(0.0),
-            sag_max_m: quantile(&sags, 1.0).unwrap_or(0.0),
-            free_sag_median_m: quantile(&free, 0.5).unwrap_or(0.0),
-            free_sag_max_m: quantile(&free, 1.0).unwrap_or(0.0),
+            sag_median_m: quantile(&sags, 0.5),
+            sag_max_m: quantile(&sags, 1.0),
+            free_sag_median_m: quantile(&free, 0.5),
+            free_sag_max_m: quantile(&free, 1.0),
         }
     };
     results.modes().into_iter().map(of_mode).collect()
@@ -106,17 +108,47 @@ pub fn table(rows: &[Carried]) -> String {
     let heads =
         ["mode", "remembered", "carried", "held", "sag, median", "sag, largest", "off before a touch", "largest"];
     let mut table = Table::new(heads);
+    let millimetres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |m| format!("{:.1} mm", m * 1e3));
     for row in rows {
         table.row([
             row.mode.to_string(),
             format!("{:.1} kg", row.remembered_kg),
             format!("{:.1} kg", row.carried_kg),
             format!("{} of {}", row.held, row.trials),
-            format!("{:.1} mm", row.sag_median_m * 1e3),
-            format!("{:.1} mm", row.sag_max_m * 1e3),
-            format!("{:.1} mm", row.free_sag_median_m * 1e3),
-            format!("{:.1} mm", row.free_sag_max_m * 1e3),
+            millimetres(row.sag_median_m),
+            millimetres(row.sag_max_m),
+            millimetres(row.free_sag_median_m),
+            millimetres(row.free_sag_max_m),
         ]);
     }
     table.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures;
+    use crate::outcome::Outcome;
+    use lab::procedure::Mode;
+
+    #[test]
+    fn a_median_that_nobody_measured_is_none_and_no_zero() {
+        let mut results = fixtures::results(&[1]);
+        for report in &mut results.reports {
+            report.free_sag_m = None;
+            if report.key.mode == Mode::Adaptive {
+                report.outcome = Outcome::Stopped("JointSpeed".to_owned());
+                report.sag_m = Some(0.0);
+            }
+        }
+        let rows = carried(Case::Usual, &results, 1.0);
+        let row = |mode: Mode| rows.iter().find(|row| row.mode == mode).unwrap();
+        assert_eq!((row(Mode::Adaptive).sag_median_m, row(Mode::Adaptive).sag_max_m), (None, None));
+        assert_eq!((row(Mode::OpenLoop).sag_median_m, row(Mode::OpenLoop).free_sag_max_m), (Some(0.002), None));
+        assert_eq!(row(Mode::Adaptive).trials, 48);
+        let text = table(&rows);
+        assert!(text.contains('-') && !text.contains("0.0 mm"), "{text}");
+        let json = serde_json::to_value(row(Mode::Adaptive)).unwrap();
+        assert!(json["sag_median_m"].is_null() && json["free_sag_median_m"].is_null(), "{json}");
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::grid::Grid;
 use super::results::Results;
-use super::statistics::Summary;
+use super::statistics::{Spread, Summary};
 use lab::procedure::Mode;
 use lab::table::Table;
 
@@ -81,6 +81,21 @@ pub fn short(value: f64) -> String {
     if value.fract().abs() < 1e-9 { format!("{value:.0}") } else { format!("{value:.1}") }
 }
 
+/// Words on a value; a dash for one that nobody could measure.
+fn or_none<T>(value: Option<T>, words: impl FnOnce(T) -> String) -> String {
+    value.map_or_else(|| "-".to_owned(), words)
+}
+
+/// Median and largest of a force.
+fn newtons(force: Option<Spread>) -> String {
+    or_none(force, |force| format!("{:.1} N  {:.1} N", force.median, force.max))
+}
+
+/// Median and largest of a way.
+fn millimetres(way: Option<Spread>) -> String {
+    or_none(way, |way| format!("{:.1} mm  {:.1} mm", way.median * 1e3, way.max * 1e3))
+}
+
 /// The figures of each mode as a table.
 pub fn table(summaries: &[Summary]) -> String {
     let mut heading = vec!["mean over the seeds".to_owned()];
@@ -92,9 +107,7 @@ pub fn table(summaries: &[Summary]) -> String {
     };
     row("held", &|s| format!("{} of {}", short(s.success), s.cells));
     if summaries.iter().any(|summary| summary.success_interval.is_some()) {
-        row("held, 95 % interval over the arms", &|s| {
-            s.success_interval.map_or_else(|| "-".to_owned(), |i| i.bounds())
-        });
+        row("held, 95 % interval over the arms", &|s| or_none(s.success_interval, |interval| interval.bounds()));
     }
     row("held, seed by seed", &|s| s.success_by_seed.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));
     row("knocked over, missed, pushed away", &|s| {
@@ -102,42 +115,36 @@ pub fn table(summaries: &[Summary]) -> String {
     });
     row("dropped, crushed, stopped", &|s| format!("{} {} {}", short(s.dropped), short(s.crushed), short(s.stopped)));
     row("not lifted, unstable", &|s| format!("{} {}", short(s.not_lifted), short(s.unstable)));
-    row("farthest success", &|s| format!("{:.1} cm", s.farthest_success_m * 100.0));
-    row("largest adaptation", &|s| format!("{:.1} cm  {:.1} deg", s.adaptation_m * 100.0, s.adaptation_deg));
-    row("peak force before closing, median, max", &|s| {
-        format!("{:.1} N  {:.1} N", s.contact_peak_n.median, s.contact_peak_n.max)
+    row("farthest success", &|s| or_none(s.farthest_success_m, |m| format!("{:.1} cm", m * 100.0)));
+    row("largest adaptation", &|s| {
+        or_none(s.adaptation_m.zip(s.adaptation_deg), |(m, degrees)| format!("{:.1} cm  {degrees:.1} deg", m * 100.0))
     });
+    row("peak force before closing, median, max", &|s| newtons(s.contact_peak_n));
     if summaries.iter().any(|summary| summary.below_tipping.is_some()) {
-        row("trials below the tipping force", &|s| {
-            s.below_tipping.map_or_else(|| "-".to_owned(), |share| format!("{:.0} %", share * 100.0))
-        });
+        row("trials below the tipping force", &|s| or_none(s.below_tipping, |share| format!("{:.0} %", share * 100.0)));
     }
     row("pushed before closing, median, max", &|s| {
-        format!("{:.1} cm  {:.1} cm", s.push_m.median * 100.0, s.push_m.max * 100.0)
+        or_none(s.push_m, |way| format!("{:.1} cm  {:.1} cm", way.median * 100.0, way.max * 100.0))
     });
-    row("finger on object, median, max", &|s| format!("{:.1} N  {:.1} N", s.finger_peak_n.median, s.finger_peak_n.max));
+    row("finger on object, median, max", &|s| newtons(s.finger_peak_n));
     row("finger over 50 ms, median, max; asked", &|s| {
-        format!("{:.1} N  {:.1} N; {:.1} N", s.finger_grip_n.median, s.finger_grip_n.max, s.finger_asked_n.max)
+        format!("{}; {}", newtons(s.finger_grip_n), or_none(s.finger_asked_n, |force| format!("{:.1} N", force.max)))
     });
     row("trials with at most 1.5 of what was asked", &|s| format!("{:.0} %", s.grip_as_asked * 100.0));
     row("wrist above 3 Hz, closing to lift, median, max", &|s| {
-        format!("{:.2} N  {:.2} N", s.chatter_n.median, s.chatter_n.max)
+        or_none(s.chatter_n, |force| format!("{:.2} N  {:.2} N", force.median, force.max))
     });
-    row("hand on table, max", &|s| format!("{:.1} N", s.table_peak_n.max));
-    row("sag when lifted, median, max", &|s| format!("{:.1} mm  {:.1} mm", s.sag_m.median * 1e3, s.sag_m.max * 1e3));
-    row("off its height before a touch, median, max", &|s| {
-        format!("{:.1} mm  {:.1} mm", s.free_sag_m.median * 1e3, s.free_sag_m.max * 1e3)
-    });
+    row("hand on table, max", &|s| or_none(s.table_peak_n, |force| format!("{:.1} N", force.max)));
+    row("sag when lifted, median, max", &|s| millimetres(s.sag_m));
+    row("off its height before a touch, median, max", &|s| millimetres(s.free_sag_m));
     row("shaking above 15 Hz, median, max", &|s| {
-        format!("{:.2}  {:.2} rad/s", s.shaking_rad_s.median, s.shaking_rad_s.max)
+        or_none(s.shaking_rad_s, |speed| format!("{:.2}  {:.2} rad/s", speed.median, speed.max))
     });
     row("false alarms", &|s| format!("{} of {}", s.detection.false_alarms, s.detection.successes));
     row("failures reported before the lift", &|s| {
         format!("{} of {}", s.detection.flagged_before_lift, s.detection.failures)
     });
-    row("delay of the report, median", &|s| {
-        s.detection.median_delay_s.map_or_else(|| "-".to_owned(), |delay| format!("{delay:.2} s"))
-    });
+    row("delay of the report, median", &|s| or_none(s.detection.median_delay_s, |delay| format!("{delay:.2} s")));
     table.to_string()
 }
 

@@ -131,11 +131,12 @@ pub struct Measures {
     pub contact_peak_n: f64,
     /// The same averaged over 100 ms, N.
     pub contact_sustained_n: f64,
-    /// Median of the horizontal force on the object before the fingers close, while it is touched, N.
-    pub contact_median_n: f64,
+    /// Median of the horizontal force on the object before the fingers close, while it is touched, N; `None` where it
+    /// is not.
+    pub contact_median_n: Option<f64>,
     /// The same in the mean from the first touch until the fingers close, N.
     #[serde(default)]
-    pub contact_mean_n: f64,
+    pub contact_mean_n: Option<f64>,
     /// Force of each finger on the object at the end, N.
     pub finger_n: [f64; 3],
     /// Largest force of the hand on the table, 10 ms average, N.
@@ -149,9 +150,10 @@ pub struct Measures {
     /// Force that a finger is asked for, N: the torque that the primitive asks for, over the middle of a link.
     #[serde(default)]
     pub finger_asked_n: f64,
-    /// Content of the wrist's force above 3 Hz from the closing of the fingers to the lift, RMS, N.
+    /// Content of the wrist's force above 3 Hz from the closing of the fingers to the lift, RMS, N; `None` of an
+    /// arm that stopped before.
     #[serde(default)]
-    pub chatter_n: f64,
+    pub chatter_n: Option<f64>,
     /// Largest [amplitude](crate::shaking::amplitude) of a joint's speed above 15 Hz, rad/s.
     #[serde(default)]
     pub shaking_rad_s: f64,
@@ -269,7 +271,7 @@ pub fn judge(
         failure_s,
         contact_peak_n: forces.iter().copied().fold(0.0, f64::max),
         contact_sustained_n: largest_mean(&forces, SUSTAINED),
-        contact_median_n: quantile(&touching, 0.5).unwrap_or(0.0),
+        contact_median_n: quantile(&touching, 0.5),
         contact_mean_n: mean_since(forces.iter().skip_while(|force| **force <= TOUCH)),
         finger_n: last.contact.fingers,
         table_peak_n: whole.iter().map(|sample| sample.contact.table).fold(0.0, f64::max),
@@ -290,10 +292,10 @@ fn is_grasped(sample: &Sample) -> bool {
     fingers + usize::from(sample.contact.palm > TOUCH) >= 2
 }
 
-/// Mean of forces; zero of none.
-fn mean_since<'a>(forces: impl Iterator<Item = &'a f64>) -> f64 {
+/// Mean of forces; `None` of none.
+fn mean_since<'a>(forces: impl Iterator<Item = &'a f64>) -> Option<f64> {
     let (sum, count) = forces.fold((0.0, 0.0), |(sum, count), force| (sum + force, count + 1.0));
-    sum / f64::max(count, 1.0)
+    (count > 0.0).then(|| sum / count)
 }
 
 /// Largest mean over `seconds`.
@@ -344,12 +346,25 @@ mod tests {
         let (outcome, measures) = judge(&good(), &MILESTONES, UPRIGHT, ArmConduct::default());
         assert_eq!(outcome, Outcome::Held);
         assert!((measures.lift_m - 0.1).abs() < 1e-9);
-        assert!((measures.contact_peak_n - 3.0).abs() < 1e-12 && (measures.contact_median_n - 3.0).abs() < 1e-12);
-        assert!((measures.contact_sustained_n - 3.0).abs() < 1e-12 && (measures.contact_mean_n - 3.0).abs() < 1e-12);
+        assert!(
+            (measures.contact_peak_n - 3.0).abs() < 1e-12 && (measures.contact_median_n.unwrap() - 3.0).abs() < 1e-12
+        );
+        assert!(
+            (measures.contact_sustained_n - 3.0).abs() < 1e-12
+                && (measures.contact_mean_n.unwrap() - 3.0).abs() < 1e-12
+        );
         assert!((measures.touch_s.unwrap() - 5.0).abs() < 0.011, "{:?}", measures.touch_s);
         // The fingers have moved 0.05 rad a tenth of a second after they began.
         assert!((measures.closing_s - 8.1).abs() < 0.02, "{}", measures.closing_s);
         assert_eq!((measures.failure_s, measures.lift_s), (None, 12.0));
+    }
+
+    #[test]
+    fn a_force_on_an_object_that_is_not_touched_is_not_measured() {
+        let mut observation = good();
+        observation.samples.iter_mut().for_each(|sample| sample.contact.hand_on_object = [0.0; 3]);
+        let (_, measures) = judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default());
+        assert_eq!((measures.contact_median_n, measures.contact_mean_n, measures.contact_peak_n), (None, None, 0.0));
     }
 
     #[test]
@@ -467,6 +482,6 @@ mod tests {
         let (_, measures) = judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default());
         assert!((measures.contact_peak_n - 30.0).abs() < 1e-12);
         assert!((measures.contact_sustained_n - 5.7).abs() < 1e-9, "{}", measures.contact_sustained_n);
-        assert!((measures.contact_median_n - 3.0).abs() < 1e-12);
+        assert!((measures.contact_median_n.unwrap() - 3.0).abs() < 1e-12);
     }
 }

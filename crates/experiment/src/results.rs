@@ -72,8 +72,8 @@ pub struct Report {
     pub adaptation_m: f64,
     /// Largest turn of the plan from the taught one, degrees.
     pub adaptation_deg: f64,
-    /// Distance of the hand below its plan when it has lifted, mean over 1 s, m.
-    pub sag_m: f64,
+    /// Distance of the hand below its plan when it has lifted, mean over 1 s, m; `None` where the arm stopped before.
+    pub sag_m: Option<f64>,
     /// Distance of the free hand below its plan, mean over the last second before it touches anything, m; `None` where
     /// it was not free for so long.
     #[serde(default)]
@@ -346,8 +346,8 @@ const COLUMNS: [Column; 39] = [
     ("adaptation_deg", |r| number(r.adaptation_deg)),
     ("contact_peak_n", |r| number(r.measures.contact_peak_n)),
     ("contact_sustained_n", |r| number(r.measures.contact_sustained_n)),
-    ("contact_median_n", |r| number(r.measures.contact_median_n)),
-    ("contact_mean_n", |r| number(r.measures.contact_mean_n)),
+    ("contact_median_n", |r| optional(r.measures.contact_median_n)),
+    ("contact_mean_n", |r| optional(r.measures.contact_mean_n)),
     ("finger1_n", |r| number(r.measures.finger_n[0])),
     ("finger2_n", |r| number(r.measures.finger_n[1])),
     ("finger3_n", |r| number(r.measures.finger_n[2])),
@@ -357,8 +357,8 @@ const COLUMNS: [Column; 39] = [
     ("finger2_grip_n", |r| number(r.measures.finger_grip_n[1])),
     ("finger3_grip_n", |r| number(r.measures.finger_grip_n[2])),
     ("finger_asked_n", |r| number(r.measures.finger_asked_n)),
-    ("chatter_n", |r| number(r.measures.chatter_n)),
-    ("sag_m", |r| number(r.sag_m)),
+    ("chatter_n", |r| optional(r.measures.chatter_n)),
+    ("sag_m", |r| optional(r.sag_m)),
     ("free_sag_m", |r| optional(r.free_sag_m)),
     ("shaking_rad_s", |r| number(r.measures.shaking_rad_s)),
     ("touch_s", |r| optional(r.measures.touch_s)),

@@ -23,9 +23,10 @@ pub struct Spread {
 }
 
 impl Spread {
-    fn of(values: &[f64]) -> Spread {
-        let at = |share| quantile(values, share).unwrap_or(0.0);
-        Spread { median: at(0.5), p95: at(0.95), max: at(1.0) }
+    /// `None` of nothing: a quantity that nobody measured is not zero.
+    fn of(values: &[f64]) -> Option<Spread> {
+        let at = |share| quantile(values, share);
+        Some(Spread { median: at(0.5)?, p95: at(0.95)?, max: at(1.0)? })
     }
 }
 
@@ -143,38 +144,39 @@ pub struct Summary {
     pub unstable: f64,
     /// Stopped by a fault.
     pub stopped: f64,
-    /// Largest displacement with success in at least half of the seeds, m.
-    pub farthest_success_m: f64,
+    /// Largest displacement with success in at least half of the seeds, m; `None` without a success. This and what
+    /// follows are `None` where nobody could measure them: without a trial that succeeded, or that went on to its end.
+    pub farthest_success_m: Option<f64>,
     /// Largest adaptation of a trial that succeeded, m.
-    pub adaptation_m: f64,
+    pub adaptation_m: Option<f64>,
     /// Largest adaptation of a trial that succeeded, degrees.
-    pub adaptation_deg: f64,
+    pub adaptation_deg: Option<f64>,
     /// Peak force on the object before the fingers close, N.
-    pub contact_peak_n: Spread,
+    pub contact_peak_n: Option<Spread>,
     /// Share of the trials in which that peak, averaged over 100 ms, stays below the tipping force, and the arm does
     /// not stop by itself; `None` where nothing can tip.
     pub below_tipping: Option<f64>,
     /// Way the object was pushed before the fingers close, m.
-    pub push_m: Spread,
+    pub push_m: Option<Spread>,
     /// Peak force of one finger on the object, N.
-    pub finger_peak_n: Spread,
+    pub finger_peak_n: Option<Spread>,
     /// Largest force of one finger on the object over 50 ms, N.
-    pub finger_grip_n: Spread,
+    pub finger_grip_n: Option<Spread>,
     /// Force that a finger is asked for, N.
-    pub finger_asked_n: Spread,
+    pub finger_asked_n: Option<Spread>,
     /// Share of the trials in which no finger presses with more than 1.5 times that, and the arm does not stop by
     /// itself.
     pub grip_as_asked: f64,
     /// Content of the wrist's force above 3 Hz from closing to lift, RMS, N.
-    pub chatter_n: Spread,
+    pub chatter_n: Option<Spread>,
     /// Peak force of hand on table, N.
-    pub table_peak_n: Spread,
+    pub table_peak_n: Option<Spread>,
     /// Distance of the hand below its plan when it has lifted, m.
-    pub sag_m: Spread,
+    pub sag_m: Option<Spread>,
     /// Distance of the free hand below or above its plan, just before it touches anything, m.
-    pub free_sag_m: Spread,
+    pub free_sag_m: Option<Spread>,
     /// Amplitude of the fast part of the joint speeds, rad/s.
-    pub shaking_rad_s: Spread,
+    pub shaking_rad_s: Option<Spread>,
     /// Failure detection.
     pub detection: Detection,
 }
@@ -191,6 +193,9 @@ impl Summary {
         let mean = |word: &str| count(&|report| report.outcome.name() == word) as f64 / seeds.len().max(1) as f64;
         // What an arm that stopped did not do any more is neither gentle nor firm.
         let went_on = || reports.iter().filter(|report| !report.outcome.is_stopped());
+        let measured = |value: fn(&Report) -> Option<f64>| {
+            Spread::of(&went_on().filter_map(|report| value(report)).collect::<Vec<_>>())
+        };
         let spread = |value: fn(&Report) -> f64| Spread::of(&went_on().map(|report| value(report)).collect::<Vec<_>>());
         let successes = || reports.iter().filter(|report| report.outcome.is_success());
         let farthest = reports
@@ -214,9 +219,9 @@ impl Summary {
             not_lifted: mean("not lifted"),
             unstable: mean("unstable"),
             stopped: mean("stopped"),
-            farthest_success_m: farthest.fold(0.0, f64::max),
-            adaptation_m: successes().map(|report| report.adaptation_m).fold(0.0, f64::max),
-            adaptation_deg: successes().map(|report| report.adaptation_deg).fold(0.0, f64::max),
+            farthest_success_m: farthest.reduce(f64::max),
+            adaptation_m: successes().map(|report| report.adaptation_m).reduce(f64::max),
+            adaptation_deg: successes().map(|report| report.adaptation_deg).reduce(f64::max),
             contact_peak_n: spread(|report| report.measures.contact_peak_n),
             below_tipping: tipping.map(|limit| {
                 let gentle = went_on().filter(|report| report.measures.contact_sustained_n < limit);
@@ -230,10 +235,10 @@ impl Summary {
                 .filter(|report| report.measures.hardest_finger() <= GRIP_BAR * report.measures.finger_asked_n)
                 .count() as f64
                 / reports.len().max(1) as f64,
-            chatter_n: spread(|report| report.measures.chatter_n),
+            chatter_n: measured(|report| report.measures.chatter_n),
             table_peak_n: spread(|report| report.measures.table_peak_n),
-            sag_m: spread(|report| report.sag_m),
-            free_sag_m: Spread::of(&went_on().filter_map(|r| r.free_sag_m).map(f64::abs).collect::<Vec<_>>()),
+            sag_m: measured(|report| report.sag_m),
+            free_sag_m: measured(|report| report.free_sag_m.map(f64::abs)),
             shaking_rad_s: spread(|report| report.measures.shaking_rad_s),
             detection: Detection::of(reports.iter().copied()),
         }
@@ -268,7 +273,7 @@ mod tests {
             + summary.dropped
             + summary.stopped;
         assert!((all - 48.0).abs() < 1e-9);
-        assert!((summary.farthest_success_m - 0.268).abs() < 1e-3);
+        assert!((summary.farthest_success_m.unwrap() - 0.268).abs() < 1e-3);
     }
 
     /// The change that makes it fail: what an arm that stopped did not do any more counts as done as it should be.
@@ -278,15 +283,29 @@ mod tests {
         for report in results.reports.iter_mut().filter(|report| report.key.mode == Mode::Adaptive) {
             let measures = &mut report.measures;
             (measures.contact_sustained_n, measures.finger_grip_n) = (9.0, [30.0; 3]);
-            report.sag_m = 0.01;
+            report.sag_m = Some(0.01);
             if report.key.index % 2 == 0 {
                 report.outcome = Outcome::Stopped("JointSpeed".to_owned());
-                (report.measures, report.sag_m) = (Measures::default(), 0.0);
+                (report.measures, report.sag_m) = (Measures::default(), None);
             }
         }
         let summary = Summary::of(&results, Mode::Adaptive, Some(2.0));
         assert_eq!((summary.stopped, summary.below_tipping, summary.grip_as_asked), (24.0, Some(0.0), 0.0));
-        assert_eq!((summary.sag_m.median, summary.contact_peak_n.median > 0.0), (0.01, true));
+        assert_eq!((summary.sag_m.unwrap().median, summary.contact_peak_n.unwrap().median > 0.0), (0.01, true));
+    }
+
+    #[test]
+    fn a_mode_whose_arms_all_stopped_has_no_figures_instead_of_zeros() {
+        let mut results = fixtures::results(&[1]);
+        for report in &mut results.reports {
+            report.outcome = Outcome::Stopped("JointSpeed".to_owned());
+        }
+        let summary = Summary::of(&results, Mode::Adaptive, Some(2.0));
+        let figures = [summary.contact_peak_n, summary.sag_m, summary.free_sag_m, summary.chatter_n];
+        assert_eq!(figures, [None; 4]);
+        assert_eq!((summary.farthest_success_m, summary.adaptation_m, summary.adaptation_deg), (None, None, None));
+        let table = crate::map::table(&[summary]);
+        assert!(!table.contains(" 0.0 "), "{table}");
     }
 
     #[test]

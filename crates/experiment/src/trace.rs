@@ -64,22 +64,24 @@ impl Trace {
         largest
     }
 
-    /// Mean distance of the hand below its plan between two times, m; negative where it is above.
-    pub fn sag(&self, from: f64, to: f64) -> f64 {
+    /// Mean distance of the hand below its plan between two times, m; negative where it is above, `None` without a
+    /// cycle between them.
+    pub fn sag(&self, from: f64, to: f64) -> Option<f64> {
         let cycles = self.cycles.iter().filter(|cycle| (from..=to).contains(&cycle.time));
         let (sum, count) =
             cycles.fold((0.0, 0.0), |(sum, count), cycle| (sum + cycle.position_d[2] - cycle.position[2], count + 1.0));
-        sum / f64::max(count, 1.0)
+        (count > 0.0).then(|| sum / count)
     }
 
     /// The same over the last second before something is touched (s after the start): what a free hand sags. `None`
     /// where the hand was not free for so long.
     pub fn free_sag(&self, touched: f64) -> Option<f64> {
-        (touched >= FREE_SECONDS).then(|| self.sag(touched - FREE_SECONDS, touched))
+        if touched >= FREE_SECONDS { self.sag(touched - FREE_SECONDS, touched) } else { None }
     }
 
-    /// Content above 3 Hz of the force at the wrist between two times, N: root mean square of the vector.
-    pub fn chatter(&self, from: f64, to: f64) -> f64 {
+    /// Content above 3 Hz of the force at the wrist between two times, N: root mean square of the vector; `None`
+    /// without a cycle between them.
+    pub fn chatter(&self, from: f64, to: f64) -> Option<f64> {
         let before = self.cycles.partition_point(|cycle| cycle.time < from);
         let within = self.cycles.partition_point(|cycle| cycle.time < to).saturating_sub(before);
         // The filter is at rest at the first cycle and gives a value from the second on.
@@ -87,7 +89,7 @@ impl Trace {
             let fast = high_pass(self.cycles.iter().map(|cycle| cycle.sensors[axis]), CHATTER);
             fast.skip(before.saturating_sub(1)).take(within).map(|value| value * value).sum::<f64>()
         };
-        ((0..3).map(squares).sum::<f64>() / within.max(1) as f64).sqrt()
+        (within > 0).then(|| ((0..3).map(squares).sum::<f64>() / within as f64).sqrt())
     }
 }
 
@@ -174,9 +176,9 @@ pub(crate) mod tests {
             cycle.sensors = [fast, 9.0 * turn(0.1), 2.0 * fast, 0.0, 0.0, 0.0, 5.0 * fast, 0.0, 0.0];
         }
         let whole = (5.0_f64 / 2.0).sqrt();
-        assert!((trace.chatter(0.5, 1.9) - whole).abs() < 0.03, "{}", trace.chatter(0.5, 1.9));
-        assert!(trace.chatter(2.5, 3.9) < 0.03, "{}", trace.chatter(2.5, 3.9));
-        assert_eq!(trace.chatter(9.0, 10.0), 0.0);
+        assert!((trace.chatter(0.5, 1.9).unwrap() - whole).abs() < 0.03, "{:?}", trace.chatter(0.5, 1.9));
+        assert!(trace.chatter(2.5, 3.9).unwrap() < 0.03, "{:?}", trace.chatter(2.5, 3.9));
+        assert_eq!(trace.chatter(9.0, 10.0), None, "there was no cycle");
     }
 
     #[test]
@@ -185,8 +187,9 @@ pub(crate) mod tests {
         trace.cycles[0].position_d[2] = 0.5;
         trace.cycles[1].position_d[2] = 0.004;
         trace.cycles[2].position[2] = 0.02;
-        assert!((trace.sag(1.5, 2.5) - 0.004).abs() < 1e-12);
-        assert!((trace.sag(1.5, 3.5) + 0.008).abs() < 1e-12);
+        assert!((trace.sag(1.5, 2.5).unwrap() - 0.004).abs() < 1e-12);
+        assert!((trace.sag(1.5, 3.5).unwrap() + 0.008).abs() < 1e-12);
+        assert_eq!(trace.sag(7.0, 8.0), None, "there was no cycle");
     }
 
     #[test]

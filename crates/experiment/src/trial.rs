@@ -208,7 +208,7 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
         // A movement that lifts by itself is measured against its own plan: behind it the arm holds whatever it has
         // reached.
         sag_m: match (&fault, config.scenario.lifts_itself()) {
-            (Some(_), _) => 0.0,
+            (Some(_), _) => None,
             (None, true) => trace.sag(arrived - run - SETTLED_SECONDS, arrived - run),
             (None, false) => trace.sag(end - run - SETTLED_SECONDS, end - run),
         },

@@ -114,12 +114,16 @@ impl FromStr for Variation {
 
     fn from_str(text: &str) -> Result<Variation, String> {
         let mut variation = Variation::default();
+        let mut given = [false; PARTS.len()];
         for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
             let (name, value) = part.split_once('=').ok_or_else(|| format!("'{part}' lacks its value"))?;
             let Some(index) = Variation::part(name.trim()) else {
                 let known: Vec<&str> = PARTS.iter().map(|(name, ..)| *name).collect();
                 return Err(format!("'{name}' cannot be varied; there are {}", known.join(", ")));
             };
+            if std::mem::replace(&mut given[index], true) {
+                return Err(format!("{} is given twice; one of the two would be ignored", name.trim()));
+            }
             let (_, low, high) = PARTS[index];
             match value.trim().parse::<f64>() {
                 Ok(value) if (low..=high).contains(&value) => variation.set(index, value),
@@ -160,6 +164,7 @@ mod tests {
         assert!("mass".parse::<Variation>().unwrap_err().contains("lacks its value"));
         assert!("delay=1.5".parse::<Variation>().unwrap_err().contains("whole number"));
         assert!("bias=NaN".parse::<Variation>().is_err());
+        assert!("mass=1.1,noise=2,mass=1.2".parse::<Variation>().unwrap_err().contains("mass is given twice"));
         assert!(
             "speed=2.1".parse::<Variation>().unwrap_err().contains("between 0.1 and 2"),
             "more than a device takes"

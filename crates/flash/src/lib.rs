@@ -134,7 +134,11 @@ impl Flash {
         file.read_to_end(&mut bytes)?;
         if bytes.is_empty() {
             bytes = vec![BLANK; FLASH_BYTES];
-            file.write_all(&bytes)?;
+            if let Err(cause) = file.write_all(&bytes) {
+                // Half a flash would be refused for its size once there is room again; an empty file is a new one.
+                let _ = file.set_len(0);
+                return Err(cause);
+            }
         } else if bytes.len() != FLASH_BYTES {
             let message = format!("it has {} bytes where a flash has {FLASH_BYTES}", bytes.len());
             return Err(io::Error::new(io::ErrorKind::InvalidData, message));

@@ -150,7 +150,8 @@ error_codes! {
     NameInvalid = 220: "the name of the primitive is not valid",
         "too long, empty, other characters than letters, digits, `-`, `_` and `.`, or `-` or `.` at its begin",
         "give a name with `--name NAME`";
-    LearnOption = 221: "an option of `learn` is out of its range", "a value on the command line", "";
+    LearnOption = 221: "an option of `learn` is out of its range", "a value on the command line",
+        "`tactus learn --help` says what each option takes";
     NoAngles = 222: "no angles are given", "`calibrate home` without `--here` and `--set`", "`--here` or `--set`";
     AttachMayReset = 223: "attaching the debug probe can restart the board", "`logs` on a live board without leave",
         "take the torque from the arm (Shift-Idle), then `tactus logs --attach-may-reset`; better, start it before \

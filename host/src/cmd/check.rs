@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::{ErrorCode, Failure, Global};
 use crate::check::{self, Course};
+use lab::demonstration::Recording;
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
 use link::Goal;
 
@@ -29,7 +30,7 @@ pub struct Cmd {
 /// The file is wrong, or the check found a violation.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
-    let file = PrimitiveFile::read(&command.primitive).map_err(|cause| failure(cause, &command.primitive, "check"))?;
+    let file = read(&command.primitive, "check")?;
     let bar = output.bar(100, "%", "playing the plan");
     let course = Course { goal: goal(command.goal), ..Course::stored(command.speed) };
     let report = check::check(&file, &course, |fraction| bar.set_position((fraction * 100.0) as u64))
@@ -51,25 +52,41 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     })
 }
 
-/// The failure of a command that was `doing` something with a primitive file.
+/// The primitive in a file, for a command that is `doing` something with it.
+///
+/// # Errors
+/// It is none.
+pub(super) fn read(path: &Path, doing: &str) -> Result<PrimitiveFile, Failure> {
+    PrimitiveFile::read(path).map_err(|cause| failure(cause, path, doing))
+}
+
+/// The failure of a command that was `doing` something with a primitive file, which `cause` names.
 pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Failure {
+    let refused = format!("{doing} refused");
     let code = match &cause {
         PrimitiveFileError::Model { .. } => ErrorCode::PrimitiveModel,
         PrimitiveFileError::ExpectationModel { .. } | PrimitiveFileError::ExpectationDuration { .. } => {
-            return Failure::new(ErrorCode::ExpectationStale, format!("{doing} refused {}", path.display()), cause)
+            return Failure::new(ErrorCode::ExpectationStale, refused, cause)
                 .help(format!("record it again: `tactus rehearse {}`", path.display()));
         }
         PrimitiveFileError::StatisticsAlone { .. } => {
             let help = format!("`tactus rehearse {}` records an expectation; then gather them again", path.display());
-            return Failure::new(ErrorCode::NoExpectation, format!("{doing} refused {}", path.display()), cause)
-                .help(help);
+            return Failure::new(ErrorCode::NoExpectation, refused, cause).help(help);
+        }
+        PrimitiveFileError::Io { .. } if !path.exists() && path.with_extension("toml").is_file() => {
+            let help = format!("there is a file {}", path.with_extension("toml").display());
+            return Failure::of_file(ErrorCode::PrimitiveUnreadable, refused, cause).help(help);
+        }
+        PrimitiveFileError::Syntax { .. } if Recording::read(path).is_ok() => {
+            let help = format!("this is a recording: `tactus learn {}` makes a primitive of it", path.display());
+            return Failure::new(ErrorCode::PrimitiveUnreadable, refused, cause).help(help);
         }
         PrimitiveFileError::Schema { .. } => ErrorCode::PrimitiveSchema,
         PrimitiveFileError::Checksum { .. } => ErrorCode::PrimitiveChecksum,
         PrimitiveFileError::Image { .. } | PrimitiveFileError::Invalid { .. } => ErrorCode::PrimitiveInvalid,
         _ => ErrorCode::PrimitiveUnreadable,
     };
-    Failure::of_file(code, format!("{doing} refused {}", path.display()), cause)
+    Failure::of_file(code, refused, cause)
 }
 
 /// A goal of the grasp point (m), or the stored one.

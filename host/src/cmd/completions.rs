@@ -2,8 +2,10 @@
 
 use clap::{Args, CommandFactory as _};
 use clap_complete::Shell;
+use schemars::JsonSchema;
+use serde::Serialize;
 
-use super::{Cli, ErrorCode, Failure};
+use super::{Cli, Failure, Global};
 
 /// Options of `completions`.
 #[derive(Debug, Clone, Args)]
@@ -13,16 +15,23 @@ pub struct Cmd {
     pub shell: Shell,
 }
 
+/// Data of `tactus --json completions`.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Completing {
+    /// The shell.
+    pub shell: String,
+    /// Text that this shell reads.
+    pub script: String,
+}
+
 /// Writes the completions to standard output, for example to `~/.local/share/bash-completion/completions/tactus`.
 ///
 /// # Errors
-/// Standard output was closed.
-pub fn run(command: &Cmd) -> Result<(), Failure> {
-    use std::io::Write as _;
+/// Standard output cannot take them.
+pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     // Into memory first: the generator panics where it cannot write.
-    let mut text = Vec::new();
-    clap_complete::generate(command.shell, &mut Cli::command(), "tactus", &mut text);
-    let mut stdout = std::io::stdout().lock();
-    let written = stdout.write_all(&text).and_then(|()| stdout.flush());
-    written.map_err(|cause| Failure::of_file(ErrorCode::ResultNotWritten, "completions", cause))
+    let mut script = Vec::new();
+    clap_complete::generate(command.shell, &mut Cli::command(), "tactus", &mut script);
+    let script = String::from_utf8_lossy(&script).into_owned();
+    global.output().result(&Completing { shell: command.shell.to_string(), script: script.clone() }, script)
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use control::Fault;
 use device::Stage;
-use link::{HomeSource, Refusal, Secret, SecretState, Status};
+use link::{HandStage, HomeSource, Refusal, Secret, SecretState, Status};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
@@ -197,7 +197,8 @@ fn started(
     let simulated = client.is_simulated();
     let hello = client.hello();
     let kind = if simulated { "simulated " } else { "" };
-    output.say(format!("{kind}arm ready on {} ({})", hello.board.as_str(), hello.firmware.as_str()));
+    let what = if hello.capabilities.arm { "arm" } else { "hand" };
+    output.say(format!("{kind}{what} ready on {} ({})", hello.board.as_str(), hello.firmware.as_str()));
     Ok(())
 }
 
@@ -301,7 +302,18 @@ pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
         ProcedureError::NotZeroed => ErrorCode::NotZeroed,
         ProcedureError::ZeroOfOthers => ErrorCode::ZeroUnknown,
         ProcedureError::Moves { .. } => ErrorCode::ArmMoves,
-        ProcedureError::Loaded { .. } => ErrorCode::HandLoaded,
+        ProcedureError::Loaded { .. } | ProcedureError::Grips { .. } => ErrorCode::HandLoaded,
+        ProcedureError::HandMoves { .. } => {
+            return Failure::new(ErrorCode::ArmMoves, doing, error).help("let the hand come to rest, and try again");
+        }
+        ProcedureError::NothingToTare { hand: HandStage::Absent } => {
+            return Failure::new(ErrorCode::NoHand, doing, error)
+                .help("check the cables of force sensor and hand; they are looked for when the arm's bus starts");
+        }
+        ProcedureError::NothingToTare { .. } => {
+            return Failure::new(ErrorCode::HandNotReady, doing, error)
+                .help("`tactus hand init`, then `tactus tare`; the fingers will open");
+        }
         ProcedureError::Stopped(_) => ErrorCode::ArmStopped,
         ProcedureError::Diverted(_) => ErrorCode::Diverted,
         ProcedureError::TooLong { .. } => ErrorCode::TooLong,
@@ -350,7 +362,11 @@ pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure
             code => code,
         },
         SimulationError::BoardReport(cause) => cause.code(),
-        SimulationError::Flash(..) => return Failure::of_file(ErrorCode::FlashFile, doing, error),
+        SimulationError::Flash(_, cause) => {
+            let is_used = cause.kind() == std::io::ErrorKind::ResourceBusy;
+            let failure = Failure::of_file(ErrorCode::FlashFile, doing, error);
+            return if is_used { failure.help("end the command that uses it, or name another file") } else { failure };
+        }
         SimulationError::Faults(..) => ErrorCode::FaultScript,
         _ => ErrorCode::SimulatorFailed,
     };

@@ -5,7 +5,7 @@ use link::Name;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{Failure, Global, connection};
+use super::{Failure, Global, connection, get};
 
 /// Options of `delete`.
 #[derive(Debug, Clone, Args)]
@@ -22,7 +22,7 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "delete";
     let mut client = connection::open(global, DOING, |_| {})?;
-    client.delete(&command.name).map_err(|error| error.into_failure(DOING))?;
+    client.delete(&command.name).map_err(|error| get::failure(error, &command.name, global, DOING))?;
     let name = command.name.as_str();
     global.output().result(&Deleted { deleted: name.to_owned() }, format!("deleted '{name}'"))
 }

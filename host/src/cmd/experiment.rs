@@ -7,7 +7,7 @@ use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{ErrorCode, Failure, Global};
+use super::{ErrorCode, Failure, Global, experiment_values as values};
 use experiment::sweep::Point;
 use experiment::{Comparison, Grid, Mode, PlantKind, Scenario, Summary, Sweep, Variation};
 
@@ -22,23 +22,23 @@ pub struct Cmd {
     #[arg(long, visible_alias = "cells", allow_hyphen_values = true)]
     pub grid: Option<Grid>,
     /// Rotate the grid about its middle, degrees
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = values::degrees, allow_hyphen_values = true)]
     pub rotate: f64,
     /// Shift the grid along the approach and sideways, cm
-    #[arg(long, value_name = "ALONG,SIDEWAYS", value_parser = super::learn::numbers::<2>, default_value = "0,0", allow_hyphen_values = true)]
+    #[arg(long, value_name = "ALONG,SIDEWAYS", value_parser = values::shift, default_value = "0,0", allow_hyphen_values = true)]
     pub shift: [f64; 2],
     /// Modes: a open loop, b force control, c force control and adaptation, d as c but the fingers do not adapt
     /// [default: a,b,c; lift c; fingers c,d]
     #[arg(long, value_delimiter = ',', value_parser = str::parse::<Mode>)]
     pub modes: Vec<Mode>,
     /// Try every cell with the seeds 1 to N, or FROM to TO; a seed is an arm
-    #[arg(long, value_name = "N|FROM:TO", value_parser = numbers, conflicts_with = "seed")]
+    #[arg(long, value_name = "N|FROM:TO", value_parser = values::numbers, conflicts_with = "seed")]
     pub seeds: Option<RangeInclusive<u64>>,
     /// Try every cell with this seed only
     #[arg(long)]
     pub seed: Option<u64>,
     /// Teach N times, each time by another person, and try every demonstration on every arm; FROM:TO names the persons
-    #[arg(long, value_name = "N|FROM:TO", value_parser = numbers, conflicts_with = "primitive")]
+    #[arg(long, value_name = "N|FROM:TO", value_parser = values::numbers, conflicts_with = "primitive")]
     pub demonstrations: Option<RangeInclusive<u64>>,
     /// Repeat with a factor of `--vary` over a range, until less than half is held: `joint-friction=1:0`,
     /// `bias=0:2:4` (steps)
@@ -48,13 +48,7 @@ pub struct Cmd {
     #[arg(long, value_name = "FILE")]
     pub primitive: Option<PathBuf>,
     /// Learn the movement this many times as fast as it is shown; the fingers keep their time
-    #[arg(
-        long,
-        value_name = "FACTOR",
-        default_value_t = 1.0,
-        conflicts_with = "primitive",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = values::faster, conflicts_with = "primitive")]
     pub learn_speed: f64,
     /// Difference between the simulated arm and the controller's model
     #[arg(long, value_enum, default_value = "perturbed")]
@@ -128,22 +122,6 @@ pub struct Studied {
     pub sweep: Option<String>,
     /// Cells that were held, value by value.
     pub points: Vec<Point>,
-}
-
-/// Largest number of an arm or a person; those that gather statistics have numbers above.
-const LARGEST_NUMBER: u64 = 1000;
-
-/// Numbers of arms or persons: `N` for 1 to N, or `FROM:TO`.
-fn numbers(text: &str) -> Result<RangeInclusive<u64>, String> {
-    let number = |text: &str| text.parse::<u64>().map_err(|error| format!("'{text}': {error}"));
-    let (first, last) = match text.split_once(':') {
-        Some((first, last)) => (number(first)?, number(last)?),
-        None => (1, number(text)?),
-    };
-    if first < 1 || last < first || last > LARGEST_NUMBER {
-        return Err(format!("numbers are from 1 to {LARGEST_NUMBER}, the smaller one first"));
-    }
-    Ok(first..=last)
 }
 
 /// Carries an experiment through.
@@ -221,6 +199,10 @@ mod work {
     ) -> Result<Config, Failure> {
         let engine = engine(global)?;
         let object = command.object.as_deref().map(object).transpose()?;
+        if command.figures_only && !out.is_dir() {
+            let cause = format!("there is no folder {}", out.display());
+            return Err(Failure::new(ErrorCode::NoResults, "experiment refused", cause));
+        }
         std::fs::create_dir_all(out).map_err(|cause| unwritable(out, cause))?;
         let primitive = primitive(command, out, number, interrupt, output)?;
         let usual = Config::new(command.scenario, primitive);
@@ -577,19 +559,6 @@ mod work {
         match error {
             PreparationError::Trial(error) => trial_failure(error),
             error => Failure::new(ErrorCode::NotTaught, "experiment: no primitive was made", error),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::numbers;
-
-    #[test]
-    fn numbers_are_counted_from_one_or_from_where_they_begin() {
-        assert_eq!((numbers("5"), numbers("11:20"), numbers("7:7")), (Ok(1..=5), Ok(11..=20), Ok(7..=7)));
-        for wrong in ["0", "0:3", "5:4", "1001", "a", "1:", ":3", "-2", "1:2:3", ""] {
-            assert!(numbers(wrong).is_err(), "{wrong}");
         }
     }
 }

@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use link::{Name, PrimitiveImage};
+use link::{Name, PrimitiveImage, Refusal};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, connection, files};
 use lab::client::Client;
 use lab::device::Device;
+use lab::error::HostError;
 use lab::primitive_file::PrimitiveFile;
 
 /// Options of `get`.
@@ -32,7 +33,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let path = command.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", command.name)));
     let output_file = files::create(&path, global, &[], "get refused")?;
     let mut client = connection::open(global, DOING, |_| {})?;
-    let file = fetch(&mut client, &command.name, DOING)?;
+    let file = fetch(&mut client, &command.name, global, DOING)?;
     let text = file.checked_text().map_err(|cause| super::check::failure(cause, &path, DOING))?;
     files::fill(output_file, text.as_bytes(), DOING)?;
     let content = file.checksum();
@@ -53,9 +54,34 @@ pub struct Gotten {
     pub content: String,
 }
 
+/// The failure of a request about a primitive in the device: one that is not there is named, with the place where it
+/// may be.
+pub(super) fn failure(error: HostError, name: &Name, global: &Global, doing: &str) -> Failure {
+    if !matches!(error, HostError::Refused { reason: Refusal::NoSuchPrimitive, .. }) {
+        return error.into_failure(doing);
+    }
+    let failure = error.into_failure(format!("{doing} '{name}'"));
+    let file = format!("{name}.toml");
+    if Path::new(&file).is_file() {
+        return failure.help(format!("there is a file {file}: `tactus run {file}`, or `tactus upload {file}`"));
+    }
+    if global.forgets() {
+        return failure.help(
+            "this simulated device begins empty with every command: `flash=FILE` in its address keeps what it stores, \
+             `tactus sim` serves one that stays",
+        );
+    }
+    failure
+}
+
 /// The primitive that the device stores under a name.
-pub(super) fn fetch(client: &mut Client<Device>, name: &Name, doing: &str) -> Result<PrimitiveFile, Failure> {
-    let image = client.read_image(name, |_| {}).map_err(|error| error.into_failure(doing))?;
+pub(super) fn fetch(
+    client: &mut Client<Device>,
+    name: &Name,
+    global: &Global,
+    doing: &str,
+) -> Result<PrimitiveFile, Failure> {
+    let image = client.read_image(name, |_| {}).map_err(|error| failure(error, name, global, doing))?;
     let image =
         PrimitiveImage::parse(&image).map_err(|cause| Failure::new(ErrorCode::ReadBackDiffers, doing, cause))?;
     let file = PrimitiveFile::from_image(Path::new(name.as_str()), &image);

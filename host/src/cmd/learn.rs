@@ -54,10 +54,10 @@ pub struct Cmd {
     #[arg(long)]
     pub no_trim: bool,
     /// Hand at the start: spread and fingers 1 to 3, rad
-    #[arg(long, value_name = "S,F1,F2,F3", default_value = "0,0,0,0", value_parser = numbers::<4>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "S,F1,F2,F3", default_value = "0,0,0,0", value_parser = hand, allow_hyphen_values = true)]
     pub hand_start: [f64; 4],
     /// Hand at the end: spread and fingers 1 to 3, rad
-    #[arg(long, value_name = "S,F1,F2,F3", default_value = "0,0,0,0", value_parser = numbers::<4>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "S,F1,F2,F3", default_value = "0,0,0,0", value_parser = hand, allow_hyphen_values = true)]
     pub hand_goal: [f64; 4],
     /// Rest at the goal behind the movement, s: time for the fingers to close
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_hyphen_values = true)]
@@ -89,6 +89,11 @@ pub type Sensitivity = [f64; 10];
 /// The demonstration or an option is wrong, or the file cannot be written.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
+    if command.demonstration.is_dir() {
+        let cause = std::io::Error::from(std::io::ErrorKind::IsADirectory);
+        let doing = format!("learn refused {}", command.demonstration.display());
+        return Err(Failure::of_file(ErrorCode::RecordingInvalid, doing, cause).help("name a recording in this folder"));
+    }
     let file = command.output.clone().unwrap_or_else(|| command.demonstration.with_extension("toml"));
     let name = match &command.name {
         Some(name) => name.clone(),
@@ -212,6 +217,18 @@ fn sensitivity(text: &str) -> Result<Sensitivity, String> {
         return Ok(std::array::from_fn(|row| arm.get(row).copied().unwrap_or(0.0)));
     }
     numbers::<10>(text).map_err(|reason| format!("{reason}, or only the first 6"))
+}
+
+/// Two turns, rad: no digit goes half as far, but an angle in degrees is mostly larger.
+const NO_RADIANS: f64 = 4.0 * std::f64::consts::PI;
+
+/// Spread and fingers 1 to 3, rad. The check of the primitive says how far they can go.
+fn hand(text: &str) -> Result<[f64; 4], String> {
+    let angles = numbers::<4>(text)?;
+    match angles.into_iter().find(|angle| angle.abs() > NO_RADIANS) {
+        Some(angle) => Err(format!("no digit turns as far as {angle} rad: are these degrees? Radians are expected")),
+        None => Ok(angles),
+    }
 }
 
 /// Numbers separated by commas.

@@ -12,6 +12,7 @@ pub mod delete;
 pub mod doctor;
 mod examples;
 pub mod experiment;
+mod experiment_values;
 pub mod explain;
 pub mod export;
 pub mod faults;
@@ -55,6 +56,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use clap::parser::ValueSource;
 use clap::{ArgAction, ArgMatches, Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 pub use output::Output;
@@ -321,14 +323,27 @@ fn read(mut command: clap::Command) -> Result<(Cli, ArgMatches), ExitCode> {
         Ok(read) => return Ok(read),
         Err(error) => error,
     };
-    if let Some((problem, mut without)) = configuration::without_wrong_timeout(another)
-        && let Ok(read) = parsed(&mut without)
-        && matches!(read.0.command, Command::Stop(_))
-    {
-        read.0.global.output().warn(problem);
+    let Some((cause, mut without)) = configuration::without_wrong_timeout(another) else { return Err(usage(&error)) };
+    // Nobody has typed the option that clap names.
+    let Ok(read) = parsed(&mut without) else { return Err(usage(&error)) };
+    let output = read.0.global.output();
+    // clap looks at the variable even where the option is given.
+    let (mut is_given, mut matches) = (false, &read.1);
+    loop {
+        is_given |= matches.value_source("timeout") == Some(ValueSource::CommandLine);
+        let Some((_, inner)) = matches.subcommand() else { break };
+        matches = inner;
+    }
+    if is_given {
         return Ok(read);
     }
-    Err(usage(&error))
+    if matches!(read.0.command, Command::Stop(_)) {
+        output.warn(format!("{TIMEOUT_VARIABLE} is ignored: {cause}"));
+        return Ok(read);
+    }
+    let failure = Failure::new(ErrorCode::CommandLine, TIMEOUT_VARIABLE, cause)
+        .help(format!("correct {TIMEOUT_VARIABLE} in the environment, or give `--timeout`"));
+    Err(tell(&failure, output.json))
 }
 
 /// Runs what the command line asks for and reports failures; gives the exit code of the process.
@@ -363,7 +378,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Report(command) => report::run(&command, &global),
         Command::Export(command) => export::run(&command, &global),
         Command::Explain(command) => explain::run(&command, &global),
-        Command::Completions(command) => completions::run(&command),
+        Command::Completions(command) => completions::run(&command, &global),
         Command::Manual(command) => manual::run(&command, &global),
         Command::Config(command) => config::run(&command, &global),
         Command::Secret(command) => secret::run(&command, &global),
@@ -396,7 +411,12 @@ pub fn usage(error: &clap::Error) -> ExitCode {
         // Nobody may be there any more to read it.
         let _ = writeln!(std::io::stdout(), "{}", failure.to_json());
     }
-    let _ = error.print();
+    let shown = error.print();
+    if !error.use_stderr()
+        && let Err(failure) = output::written(shown)
+    {
+        return tell(&failure, wants_json);
+    }
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
 

@@ -9,7 +9,20 @@ use serde::Serialize;
 use super::{ErrorCode, Failure, progress};
 
 /// The action that fails when standard output does.
-const WRITING: &str = "writing the result to standard output";
+pub(super) const WRITING: &str = "writing the result to standard output";
+
+/// Judges what became of writing to standard output, once all of it has left; false where nobody reads it any more,
+/// which is no failure: `tactus --help | head -1` is a way to use it.
+///
+/// # Errors
+/// The output could not take it.
+pub(super) fn written(outcome: std::io::Result<()>) -> Result<bool, Failure> {
+    match outcome.and_then(|()| std::io::stdout().flush()) {
+        Err(cause) if cause.kind() == ErrorKind::BrokenPipe => Ok(false),
+        Err(cause) => Err(Failure::of_file(ErrorCode::ResultNotWritten, WRITING, cause)),
+        Ok(()) => Ok(true),
+    }
+}
 
 /// Where the output of one command goes.
 #[derive(Debug, Clone, Copy, Default)]
@@ -55,12 +68,7 @@ impl Output {
         } else {
             text.as_ref().trim_end().into()
         };
-        let mut stdout = std::io::stdout().lock();
-        match writeln!(stdout, "{line}").and_then(|()| stdout.flush()) {
-            Err(cause) if cause.kind() == ErrorKind::BrokenPipe => Ok(false),
-            Err(cause) => Err(Failure::of_file(ErrorCode::ResultNotWritten, WRITING, cause)),
-            Ok(()) => Ok(true),
-        }
+        written(writeln!(std::io::stdout(), "{line}"))
     }
 
     /// A bar for work of `steps` steps of a unit; off a terminal it is a line every ten seconds.

@@ -67,8 +67,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             Some(Demonstration::prepare(&recording, &preparation).map_err(|cause| invalid(cause.into()))?)
         }
     };
-    let primitive =
-        command.primitive.as_deref().map(PrimitiveFile::read).transpose().map_err(|cause| invalid(cause.into()))?;
+    let primitive = command.primitive.as_deref().map(|path| super::check::read(path, DOING)).transpose()?;
     let plan = match &primitive {
         None => None,
         Some(file) => {

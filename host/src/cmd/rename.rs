@@ -5,7 +5,7 @@ use link::{Name, Refusal};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{ErrorCode, Failure, Global, connection};
+use super::{ErrorCode, Failure, Global, connection, get};
 use lab::error::HostError;
 
 /// Options of `rename`.
@@ -40,7 +40,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         client.delete(new).map_err(|error| error.into_failure(DOING))?;
         renamed = client.rename(old, new);
     }
-    renamed.map_err(|error| error.into_failure(DOING))?;
+    renamed.map_err(|error| get::failure(error, old, global, DOING))?;
     let data = Renamed { old: old.as_str().to_owned(), new: new.as_str().to_owned() };
     global.output().result(&data, format!("'{old}' is '{new}' now"))
 }

@@ -7,7 +7,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, files, plot};
-use lab::primitive_file::PrimitiveFile;
 use lab::report::{ReportedRun, page};
 
 /// Options of `report`.
@@ -38,8 +37,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output_file = files::create(&command.output, global, &inputs, "report refused")?;
     let invalid =
         |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::PlotInput, DOING, cause);
-    let primitive = command.primitive.as_deref().map(PrimitiveFile::read).transpose();
-    let primitive = primitive.map_err(|cause| invalid(cause.into()))?;
+    let primitive = command.primitive.as_deref().map(|path| super::check::read(path, DOING)).transpose()?;
     let read = |file: &PathBuf| ReportedRun::read(file, primitive.as_ref()).map_err(|cause| invalid(cause.into()));
     let runs = command.runs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     if let Some(file) = &primitive {

@@ -25,6 +25,7 @@ use lab::procedure::{
     self, Change, ChangeKind, CycleWriter, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, recording_text,
 };
 use lab::tracking::Tracking;
+use lab::transport::{Address, SimulatorOptions};
 
 const DOING: &str = "run";
 
@@ -87,10 +88,16 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let outputs = command.record.iter().chain(&command.bus_log).map(PathBuf::as_path);
     output_file::apart(outputs).map_err(|error| files::failure(error, "run refused"))?;
+    if let (Some(_), Some(Address::Simulated(_, SimulatorOptions { bus: Some(_), .. }))) =
+        (&command.bus_log, global.address(DOING)?)
+    {
+        let cause = "`--bus-log` and `bus=` of the device name a log each; one of the two would not be written";
+        return Err(Failure::new(ErrorCode::CommandLine, "run refused", cause).help("leave out one of the two"));
+    }
     let stored = stored_name(&command.primitive);
     let mut opened = stored.is_some().then(|| open(command, global)).transpose()?;
     let file = match (&stored, &mut opened) {
-        (Some(name), Some(client)) => get::fetch(client, name, DOING)?,
+        (Some(name), Some(client)) => get::fetch(client, name, global, DOING)?,
         _ => upload::read(&command.primitive, DOING)?,
     };
     check_expectation(&file, command, output)?;

@@ -136,6 +136,12 @@ fn set(command: &Set, global: &Global) -> Result<(), Failure> {
         Ok((key, value))
     });
     let changes = changes.collect::<Result<Vec<(Key, Setting)>, Failure>>()?;
+    let twice =
+        changes.iter().enumerate().find(|(at, (key, _))| changes[..*at].iter().any(|(earlier, _)| earlier == key));
+    if let Some((_, (key, _))) = twice {
+        let cause = format!("'{key}' is given twice; one of the two would be ignored");
+        return Err(unknown(cause, DOING).help("give each setting once"));
+    }
     let (mut client, before) = connect(global, DOING)?;
     let after = before.with(&changes).map_err(|error| unknown(error, DOING))?;
     write(&mut client, &before, &after, Vec::new(), global, DOING)

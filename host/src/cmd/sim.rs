@@ -22,7 +22,7 @@ use bus::BusServer;
 use lab::client::Interrupt;
 use lab::device::Device;
 use lab::simulation::Engine;
-use lab::transport::{Address, Transport, TransportError};
+use lab::transport::{Address, AddressError, Transport, TransportError};
 use party::{Party, Peer};
 use pendant::Pendant;
 use real_time::RealTime;
@@ -102,8 +102,10 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Failure::new(ErrorCode::CannotListen, format!("sim: cannot listen on {address}"), cause)
     };
     // Before the device: one whose place is taken must not replace the log of the one that serves there.
-    let bus =
-        command.can.as_ref().map(|address| BusServer::listen(address).map_err(|cause| refused(address, cause.into())));
+    let no_bus = |address: &str, cause: std::io::Error| {
+        refused(address, cause.into()).help("choose another with `--can`, for example `--can 127.0.0.1:29536`")
+    };
+    let bus = command.can.as_ref().map(|address| BusServer::listen(address).map_err(|cause| no_bus(address, cause)));
     let mut bus = bus.transpose()?;
     let listener = (!command.can_only)
         .then(|| listen(&command.listen).map_err(|cause| refused(&command.listen, cause)))
@@ -115,7 +117,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         }
     })?;
     if let (Some(address), Some(server)) = (&command.can, &bus) {
-        let served = server.address().map_err(|cause| refused(address, cause.into()))?;
+        let served = server.address().map_err(|cause| no_bus(address, cause))?;
         if let Some(simulation) = device.simulation() {
             simulation.keep_traffic();
         }
@@ -138,8 +140,15 @@ pub struct Simulated {
     pub simulated_s: f64,
 }
 
+/// Where an arm can be served.
+const PLACES: &str = "listen on unix:PATH or tcp:HOST:PORT";
+
 fn listen(text: &str) -> Result<Listener, Box<dyn std::error::Error + Send + Sync>> {
-    match text.parse::<Address>()? {
+    let address = match text.parse() {
+        Err(AddressError::Kind(_)) => return Err(PLACES.into()),
+        address => address?,
+    };
+    match address {
         Address::Unix(path) => {
             let listener = match UnixListener::bind(&path) {
                 // A socket nobody answers on is the left-over of one that was killed. Anything else is somebody's.
@@ -161,7 +170,7 @@ fn listen(text: &str) -> Result<Listener, Box<dyn std::error::Error + Send + Syn
             listener.set_nonblocking(true)?;
             Ok(Listener::Tcp(listener))
         }
-        _ => Err("listen on unix:PATH or tcp:HOST:PORT".into()),
+        _ => Err(PLACES.into()),
     }
 }
 

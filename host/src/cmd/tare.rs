@@ -1,7 +1,6 @@
 //! `tactus tare`: the present readings of force sensor and strain gauges become zero.
 
 use clap::Args;
-use lab::error::Capability;
 use lab::procedure::{self, Reading, Tared};
 
 use super::{Failure, Global, Table, connection};
@@ -19,21 +18,27 @@ pub struct Cmd {
 
 const DOING: &str = "tare";
 
-/// Takes the zero and tells the readings before and after. The arm stands; nothing is moved and nothing is stored: the
-/// next start-up takes a zero of its own.
+/// Takes the zero and tells the readings before and after, of the sensors that the device has. The arm stands; nothing
+/// is moved and nothing is stored: the next start-up takes a zero of its own.
 ///
 /// # Errors
 /// The device cannot be reached, has no sensor or plays a primitive; the arm moves, or something loads its hand.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut client = connection::open(global, DOING, |_| {})?;
-    client.require(Capability::Arm).map_err(|error| error.into_failure(DOING))?;
-    connection::joints_read(&mut client, command.at_home, global.output(), DOING)?;
+    let is_arm = client.hello().capabilities.arm;
+    if !is_arm && global.is_simulated_here() {
+        // Nobody could initialise the hand of this device: it has just been switched on, and ends with the command.
+        connection::ready(&mut client, command.at_home, global.output(), DOING)?;
+    } else {
+        connection::joints_read(&mut client, command.at_home, global.output(), DOING)?;
+    }
     let tared = procedure::tare(&mut client, command.loaded);
     let tared = tared.map_err(|error| connection::failed(&mut client, error, DOING))?;
     if global.is_simulated_here() {
-        global
-            .output()
-            .say("this simulated arm ends with the command, and its zero with it; `tactus sim` serves one that stays");
+        let device = if is_arm { "arm" } else { "hand" };
+        global.output().say(format!(
+            "this simulated {device} ends with the command, and its zero with it; `tactus sim` serves one that stays"
+        ));
     }
     global.output().result(&tared, table(&tared).to_string())
 }
@@ -47,9 +52,12 @@ fn table(tared: &Tared) -> Table {
     // Noise around zero has no sign that anybody should look at.
     let number = |value: f64| format!("{:.3}", (value * 1e3).round() / 1e3 + 0.0);
     for (kind, (name, unit, parts)) in channels.into_iter().enumerate() {
+        // A sensor that is not there has no row.
+        let Some(now) = now[kind] else { continue };
+        let before = before.and_then(|before| before[kind]);
         for (part, of) in parts.into_iter().enumerate() {
-            let before = before.map_or_else(|| "-".to_owned(), |before| number(before[kind][part]));
-            table.row([format!("{name} {of}"), before, number(now[kind][part]), unit.to_owned()]);
+            let before = before.map_or_else(|| "-".to_owned(), |before| number(before[part]));
+            table.row([format!("{name} {of}"), before, number(now[part]), unit.to_owned()]);
         }
     }
     table

@@ -46,6 +46,20 @@ fn cli_13_every_command_gives_one_json_object_and_nothing_else() {
     assert!(plotted.to_string().contains("figure.svg"), "{plotted}");
 }
 
+/// It has no wrist: its gauges are all that can be tared.
+#[test]
+fn a_hand_alone_tares_its_gauges() {
+    let folder = expect(tempfile::tempdir());
+    let tared =
+        one_object(&tactus(folder.path(), &["--json", "--device", "hand:", "tare"]).success().get_output().stdout);
+    for (when, largest) in [("before", 0.05), ("after", 0.005)] {
+        let reading = &tared[when];
+        assert!(reading["force_n"].is_null() && reading["torque_nm"].is_null(), "{tared}");
+        let gauges = expect(reading["gauges_nm"].as_array().ok_or("no gauges"));
+        assert!(gauges.iter().all(|gauge| gauge.as_f64().is_some_and(|gauge| gauge.abs() < largest)), "{tared}");
+    }
+}
+
 #[test]
 fn failures_are_one_json_object_with_number_and_exit_code() {
     let folder = expect(tempfile::tempdir());

@@ -44,12 +44,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         // What was measured long ago, perhaps in another posture, is no zero.
         let present = self.wrench.age().is_some_and(|age| age <= WRENCH_AGE);
-        if present && self.wrench.tare() {
-            self.hand.tare();
-            Ok(())
-        } else {
-            Err(Refusal::WrenchMissing)
-        }
+        let wrench = present && self.wrench.tare();
+        // Half a zero is none where a sensor has fallen silent; where there never was one the gauges are all there is.
+        if (wrench || self.is_bare()) && self.hand.tare() | wrench { Ok(()) } else { Err(Refusal::WrenchMissing) }
     }
 
     #[inline(never)]

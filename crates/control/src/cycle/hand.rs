@@ -85,9 +85,9 @@ impl<R: Real> HandDrive<R> {
         matches!(&self.aim, Aim::Move(motion, _) if !motion.is_finished())
     }
 
-    /// Takes the present gauges as zero.
-    pub fn tare(&mut self) {
-        self.estimator.tare();
+    /// Takes the present gauges as zero; false if none tells anything.
+    pub fn tare(&mut self) -> bool {
+        self.estimator.tare()
     }
 
     /// Takes what a gauge drifts away as zero.

@@ -174,12 +174,15 @@ impl<R: Real> HandEstimator<R> {
         })
     }
 
-    /// Takes the present gauges as zero. Those that fell silent stay as they are: what pressed on them is no zero.
-    pub fn tare(&mut self) {
-        if self.gauge_age.is_some_and(|age| age <= LOST_CYCLES) {
+    /// Takes the present gauges as zero; false if none was. Those that fell silent stay as they are: what pressed on
+    /// them is no zero.
+    pub fn tare(&mut self) -> bool {
+        let present = self.gauge_age.is_some_and(|age| age <= LOST_CYCLES);
+        if present {
             self.zero = (*self.gauge.output()).into();
             self.tared = true;
         }
+        present
     }
 
     /// Tares each gauge, unless the gauges have been tared already and this one differs from that by more than a gauge

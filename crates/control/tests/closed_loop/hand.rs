@@ -1,9 +1,10 @@
 //! The hand in the control cycle: who drives it, how it follows, and what it does with what it feels.
 
 use control::command::{Command, RunOptions};
+use control::model::ArmModel;
 use control::sense::hand::LOST_CYCLES;
 use control::time::periods;
-use control::{Event, PERIOD, Refusal, State, flags};
+use control::{Calibration, Event, PERIOD, Payload, Refusal, State, flags};
 
 use crate::hand_plant::Hand;
 use crate::primitives::{Design, START, primitive};
@@ -23,6 +24,28 @@ fn holding() -> Rig<f32> {
 
 fn hand(rig: &Rig<f32>) -> &Hand {
     rig.plant.hand.as_ref().expect("fitted")
+}
+
+/// The change that makes it fail: the zero of the gauges is taken only after that of a sensor, which is not there.
+#[test]
+fn an_arm_without_a_sensor_at_its_wrist_tares_the_gauges_of_its_hand() {
+    let mut rig = Rig::<f32>::new(START, 1);
+    rig.cycle.calibrate(Calibration::nominal(Payload::None)).expect("idle");
+    rig.plant.deaf = true;
+    // A hand that weighs nothing: what hangs on the arm is not what this is about.
+    rig.plant.model = ArmModel::new(Payload::None);
+    rig.run_for(0.5);
+    let alone = rig.tick(Some(Command::Tare)).event;
+    assert_eq!(alone, Some(Event::Refused(Refusal::WrenchMissing)), "there is neither sensor nor hand");
+    let mut hand = Hand::new(OPEN);
+    hand.unloaded += 100.0;
+    rig.plant.hand = Some(hand);
+    rig.run_for(0.5);
+    let gauges = |rig: &Rig<f32>| rig.last.expect("ran").record.gauges;
+    assert!(gauges(&rig).iter().all(|gauge| gauge.abs() > 0.02), "they are adrift: {:?}", gauges(&rig));
+    rig.command(Command::Tare);
+    rig.run_for(0.1);
+    assert!(gauges(&rig).iter().all(|gauge| gauge.abs() < 2e-3), "{:?}", gauges(&rig));
 }
 
 /// A primitive that closes the fingers to `closed` (rad), in 3 s, on the spot.

@@ -39,8 +39,9 @@ pub fn by_cell(
     limit: Option<(f64, String)>,
 ) -> Panel {
     let mean = |mode: Mode, index: usize| {
-        let values: Vec<f64> =
-            results.of(mode).filter(|report| report.key.index == index).map(|report| value(&report.measures)).collect();
+        // An arm that stopped did not do the rest: a bar of it would show that as done gently.
+        let reports = results.of(mode).filter(|report| report.key.index == index && !report.outcome.is_stopped());
+        let values: Vec<f64> = reports.map(|report| value(&report.measures)).collect();
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     };
     let groups = grid
@@ -129,6 +130,7 @@ fn draw_panel(drawing: &mut Drawing, frame: &Frame, panel: &Panel, members: &[(S
 mod tests {
     use super::*;
     use crate::fixtures;
+    use crate::outcome::Outcome;
 
     #[test]
     fn every_cell_has_a_bar_of_each_mode_and_the_limit_is_in_the_picture() {
@@ -141,5 +143,18 @@ mod tests {
         let svg = draw(&[panel], &members(&modes), "Torch", "cell").to_svg();
         assert!(svg.contains("tips over") && svg.contains("force, N") && svg.contains("(c) force control"));
         assert!(svg.matches("<rect").count() >= 2 * 48);
+    }
+
+    #[test]
+    fn a_cell_in_which_every_arm_stopped_has_no_bar() {
+        let mut results = fixtures::results(&[1, 2]);
+        for report in results.reports.iter_mut().filter(|report| report.key.index == 3) {
+            report.outcome = Outcome::Stopped("JointSpeed".to_owned());
+            report.measures = Measures::default();
+        }
+        let modes = [Mode::OpenLoop, Mode::Adaptive];
+        let panel = by_cell(&results, &Grid::paper(), &modes, "force, N".to_owned(), |m| m.contact_peak_n, None);
+        assert_eq!(panel.groups[3].1, [None, None]);
+        assert!(panel.groups[4].1.iter().all(Option::is_some));
     }
 }

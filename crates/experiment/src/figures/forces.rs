@@ -18,7 +18,11 @@ pub fn draw(results: &Results, title: &str, tipping: Option<f64>) -> Drawing {
     let modes = results.modes();
     let values: Vec<Vec<f64>> = modes
         .iter()
-        .map(|mode| results.of(*mode).map(|report| report.measures.contact_sustained_n).collect())
+        .map(|mode| {
+            // What an arm that stopped did not do any more is not gentle: it has no force that could be counted.
+            let went_on = results.of(*mode).filter(|report| !report.outcome.is_stopped());
+            went_on.map(|report| report.measures.contact_sustained_n).collect()
+        })
         .collect();
     let largest = values.iter().flatten().copied().chain(tipping).fold(0.1, f64::max);
     // The axis ends at a round number of newtons that leaves the largest bar inside.
@@ -61,9 +65,10 @@ pub fn draw(results: &Results, title: &str, tipping: Option<f64>) -> Drawing {
         let side = frame.right() + 24.0;
         drawing.text([side, corner[1] + 36.0], format!("({mode}) {}", mode.title()), 17, Anchor::Start, colour(*mode));
         let below = tipping.map(|tipping| values.iter().filter(|value| **value < tipping).count());
+        let trials = results.of(*mode).count();
         let words = match below {
-            Some(below) => format!("{below} of {} trials stay below", values.len()),
-            None => format!("{} trials", values.len()),
+            Some(below) => format!("{below} of {trials} trials stay below"),
+            None => format!("{trials} trials"),
         };
         drawing.text([side, corner[1] + 62.0], words, 16, Anchor::Start, GREY);
         drawing.text([LEFT - 12.0, corner[1] + 14.0], plain(most), 15, Anchor::End, GREY);
@@ -88,6 +93,7 @@ fn counts(values: &[f64], high: f64) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::fixtures;
+    use crate::outcome::{Measures, Outcome};
 
     #[test]
     fn every_trial_is_in_one_bar() {
@@ -100,5 +106,16 @@ mod tests {
     fn the_tipping_force_is_in_the_picture() {
         let svg = draw(&fixtures::results(&[1]), "Torch", Some(1.97)).to_svg();
         assert!(svg.contains("tips over at 2.0 N") && svg.contains("trials stay below"));
+    }
+
+    #[test]
+    fn a_trial_in_which_the_arm_stopped_is_not_shown_as_a_gentle_one() {
+        let mut results = fixtures::results(&[1]);
+        for report in &mut results.reports {
+            report.outcome = Outcome::Stopped("JointSpeed".to_owned());
+            report.measures = Measures::default();
+        }
+        let svg = draw(&results, "Torch", Some(1.97)).to_svg();
+        assert!(svg.contains("0 of 48 trials stay below") && !svg.contains("48 of 48"));
     }
 }

@@ -66,18 +66,20 @@ fn pitch(values: &[i32]) -> f64 {
     f64::from(steps.min().unwrap_or(LARGEST).min(LARGEST))
 }
 
-/// Shares of a cell by the simplest mode that holds there, and what is left.
+/// Shares of a cell by the simplest mode that holds there, and what is left; nothing of a cell that was not tried.
 fn parts(results: &Results, index: usize) -> Vec<(f64, Colour)> {
     let mut parts = Vec::new();
     let mut done = 0.0;
+    let mut is_tried = false;
     for mode in results.modes() {
-        let share = results.success_share(mode, index).unwrap_or(0.0);
+        let Some(share) = results.success_share(mode, index) else { continue };
+        is_tried = true;
         if share > done + 1e-9 {
             parts.push((share - done, colour(mode)));
             done = share;
         }
     }
-    if done < 1.0 - 1e-9 {
+    if is_tried && done < 1.0 - 1e-9 {
         parts.push((1.0 - done, PALE));
     }
     parts
@@ -157,7 +159,11 @@ mod tests {
             report.outcome = if held { Outcome::Held } else { Outcome::Missed };
         }
         assert_eq!(parts(&results, 5), [(0.5, colour(Mode::ForceControl)), (0.5, colour(Mode::Adaptive))]);
-        assert_eq!(parts(&results, 999), [(1.0, PALE)]);
+        for report in results.reports.iter_mut().filter(|report| report.key.index == 7) {
+            report.outcome = Outcome::Missed;
+        }
+        assert_eq!(parts(&results, 7), [(1.0, PALE)]);
+        assert_eq!(parts(&results, 999), [], "nobody tried it: it is not shown as one that failed");
     }
 
     #[test]

@@ -132,7 +132,7 @@ pub fn write_lift(rows: &[Carried], trials: usize, folder: &Path) -> Result<(), 
             .iter()
             .find_map(|mode| of(*mode))
             .map_or_else(String::new, |row| format!("{:.1} kg, {:.1} kg expected", row.carried_kg, row.remembered_kg));
-        (label, modes.iter().map(|mode| of(*mode).map(|row| row.sag_median_m * 1e3)).collect())
+        (label, modes.iter().map(|mode| of(*mode).and_then(|row| row.sag_median_m).map(|sag| sag * 1e3)).collect())
     });
     let title = format!("hand below its plan when it has lifted, mm, median of {trials} trials");
     let panel = bars::Panel { title, groups: groups.collect(), limit: None };

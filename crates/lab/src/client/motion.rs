@@ -50,10 +50,10 @@ impl<T: Transport> Client<T> {
         self.order(&Request::Approach { q, duration })
     }
 
-    /// Takes the present wrench and the present gauges as zero.
+    /// Takes the present wrench and the present gauges as zero, or those of them that the device has.
     ///
     /// # Errors
-    /// As [`Client::request`]; refused in a run, and where no wrench is measured.
+    /// As [`Client::request`]; refused in a run, and where no wrench is measured by an arm that has a sensor.
     pub fn tare(&mut self) -> Result<(), HostError> {
         self.order(&Request::Tare)
     }

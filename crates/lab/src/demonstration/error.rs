@@ -185,7 +185,7 @@ pub enum RecordingError {
         step: f64,
     },
     /// A joint angle of several turns.
-    #[error("{place}: no joint turns as far as {angle:.1} rad: are these degrees? Radians are expected")]
+    #[error("{place}: no joint turns as far as {} rad: are these degrees? Radians are expected", short(*.angle))]
     NoRadians {
         /// Where.
         place: Place,
@@ -253,4 +253,9 @@ pub enum DemonstrationError {
         /// Time that it takes, with what is kept before and behind it, s.
         duration: f64,
     },
+}
+
+/// An angle on a line of a terminal: what is absurd has no three hundred digits.
+fn short(angle: f64) -> String {
+    if angle.abs() < 1e6 { format!("{angle:.1}") } else { format!("{angle:.1e}") }
 }

@@ -44,7 +44,7 @@ const MOVING_END: f64 = 0.01;
 const FASTEST_STILL: f64 = 1.0;
 
 /// Speeds at which a movement can be learned, of the one that was shown.
-const SPEEDS: std::ops::RangeInclusive<f64> = 0.1..=10.0;
+pub const SPEEDS: std::ops::RangeInclusive<f64> = 0.1..=10.0;
 
 /// Longest rest at the goal, s.
 const LONGEST_DWELL: f64 = 60.0;

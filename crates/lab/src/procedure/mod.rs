@@ -29,8 +29,21 @@ pub use wait::{EndCondition, after, pass, wait_for};
 pub use weigh::{Crossings, cross_postures, slide_postures, weight_in_use};
 
 use control::Fault;
+use link::HandStage;
 
 use crate::error::HostError;
+
+/// Digits of the hand, in the order of its angles.
+const DIGITS: [&str; 4] = ["the spread", "F1", "F2", "F3"];
+
+/// Why no gauge tells anything.
+fn without_hand(stage: HandStage) -> &'static str {
+    match stage {
+        HandStage::Absent => "no hand that answers",
+        HandStage::Initialising => "the hand is being initialised",
+        HandStage::NotInitialised | HandStage::Failed | HandStage::Ready => "the hand is not initialised",
+    }
+}
 
 /// Why a procedure ended early.
 #[derive(Debug, thiserror::Error)]
@@ -60,6 +73,26 @@ pub enum ProcedureError {
     Loaded {
         /// The force, N.
         force: f64,
+    },
+    /// The hand moves where it must stand.
+    #[error("{} of the hand moves; it has to stand for a fifth of a second", DIGITS[*.digit])]
+    HandMoves {
+        /// The first digit that does: spread, F1, F2, F3.
+        digit: usize,
+    },
+    /// A hand alone grips what is to count as nothing.
+    #[error("F{} feels {torque:.2} N m at rest, more than a gauge drifts", .finger + 1)]
+    Grips {
+        /// The first finger that does, 0 for F1.
+        finger: usize,
+        /// The torque on it, N m.
+        torque: f64,
+    },
+    /// Neither a force sensor nor the gauges of a hand tell anything.
+    #[error("there is no force sensor, and {}: there is nothing to tare", without_hand(*.hand))]
+    NothingToTare {
+        /// Stage of the hand.
+        hand: HandStage,
     },
     /// A fault is latched.
     #[error("fault: {0:?}: {0}")]

@@ -18,10 +18,11 @@ const STILL: f64 = 2e-3;
 /// Longest time until these cycles have arrived.
 const TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Complete cycles over 0.2 s of an arm that stands.
+/// Complete cycles over 0.2 s of an arm that stands, or of a hand alone that does.
 ///
 /// # Errors
-/// [`ProcedureError::Moves`], [`ProcedureError::NotReady`] if its positions are not told, and as [`Client::request`].
+/// [`ProcedureError::Moves`], [`ProcedureError::HandMoves`], [`ProcedureError::NotReady`] if its positions are not
+/// told, and as [`Client::request`].
 pub(super) fn at_rest(client: &mut Client<Device>) -> Result<Vec<Telemetry>, ProcedureError> {
     client.set_telemetry(1)?;
     let cycles = watch(client);
@@ -40,24 +41,31 @@ pub(super) fn mean<const N: usize>(cycles: &[Telemetry], of: impl Fn(&Telemetry)
 
 fn watch(client: &mut Client<Device>) -> Result<Vec<Telemetry>, ProcedureError> {
     let deadline = client.now() + TIMEOUT;
+    let is_arm = client.hello().capabilities.arm;
+    let told = if is_arm { flags::POSITIONS_KNOWN } else { flags::HAND_READY };
     let mut cycles: Vec<Telemetry> = Vec::with_capacity(CYCLES);
     while cycles.len() < CYCLES {
         if client.now() > deadline {
-            return Err(ProcedureError::NotReady("it does not tell where its joints are".to_owned()));
+            return Err(ProcedureError::NotReady("it does not tell where it stands".to_owned()));
         }
         let Some(Incoming::Telemetry(cycle)) = client.next(Duration::from_millis(50))? else { continue };
-        if cycle.flags & flags::POSITIONS_KNOWN != 0 && cycle.lost_replies == 0 {
+        if cycle.flags & told != 0 && cycle.lost_replies == 0 {
             cycles.push(cycle);
         }
     }
-    let wanders = |joint: &usize| {
-        let angles = cycles.iter().map(|cycle| f64::from(cycle.q[*joint]));
+    if is_arm {
+        wandering(&cycles, |cycle| cycle.q).map_or(Ok(cycles), |joint| Err(ProcedureError::Moves { joint }))
+    } else {
+        wandering(&cycles, |cycle| cycle.hand).map_or(Ok(cycles), |digit| Err(ProcedureError::HandMoves { digit }))
+    }
+}
+
+/// The first of the angles that does not stand.
+fn wandering<const N: usize>(cycles: &[Telemetry], of: impl Fn(&Telemetry) -> [f32; N]) -> Option<usize> {
+    (0..N).find(|index| {
+        let angles = cycles.iter().map(|cycle| f64::from(of(cycle)[*index]));
         let (least, most) =
             angles.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), q| (least.min(q), most.max(q)));
         most - least > STILL
-    };
-    match (0..7).find(wanders) {
-        Some(joint) => Err(ProcedureError::Moves { joint }),
-        None => Ok(cycles),
-    }
+    })
 }

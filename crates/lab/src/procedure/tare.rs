@@ -4,7 +4,8 @@
 //! It cannot know whether a larger force is an error of the sensor or something that the hand holds or touches: a
 //! person can.
 
-use link::Telemetry;
+use control::flags;
+use link::{HandStage, Status, Telemetry};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -17,30 +18,40 @@ use crate::device::Device;
 /// hand, or touches it.
 const LOAD: f64 = 1.0;
 
+/// A larger torque (N m) on a finger at rest is no drift of its gauge, as the device judges it before a run: the hand
+/// grips something. Asked of a hand alone; of one on an arm the force sensor tells.
+const GRIP: f64 = 0.05;
+
 /// Readings of the sensors at rest, as the environment acts on the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Reading {
-    /// Force on the hand in world axes, N.
-    pub force_n: [f64; 3],
-    /// Torque about the grasp point in hand axes, N m.
-    pub torque_nm: [f64; 3],
-    /// Torque on fingers F1 to F3, N m.
-    pub gauges_nm: [f64; 3],
+    /// Force on the hand in world axes, N; null without a force sensor.
+    pub force_n: Option<[f64; 3]>,
+    /// Torque about the grasp point in hand axes, N m; null without a force sensor.
+    pub torque_nm: Option<[f64; 3]>,
+    /// Torque on fingers F1 to F3, N m; null without an initialised hand.
+    pub gauges_nm: Option<[f64; 3]>,
 }
 
-impl Reading {
-    fn of(cycles: &[Telemetry]) -> Self {
-        let wrench = mean(cycles, |cycle| cycle.wrench);
-        Self {
-            force_n: std::array::from_fn(|axis| wrench[axis]),
-            torque_nm: std::array::from_fn(|axis| wrench[axis + 3]),
-            gauges_nm: mean(cycles, |cycle| cycle.gauges),
-        }
+/// Sensors that a device has.
+#[derive(Debug, Clone, Copy)]
+struct Sensors {
+    wrist: bool,
+    fingers: bool,
+}
+
+impl Sensors {
+    fn of(status: &Status) -> Self {
+        Self { wrist: status.wrench_zeroed.is_some(), fingers: status.hand_stage == HandStage::Ready }
     }
 
-    fn force(&self) -> f64 {
-        let [x, y, z] = self.force_n;
-        x.hypot(y).hypot(z)
+    fn read(self, cycles: &[Telemetry]) -> Reading {
+        let wrench = self.wrist.then(|| mean(cycles, |cycle| cycle.wrench));
+        Reading {
+            force_n: wrench.map(|wrench| std::array::from_fn(|axis| wrench[axis])),
+            torque_nm: wrench.map(|wrench| std::array::from_fn(|axis| wrench[axis + 3])),
+            gauges_nm: self.fingers.then(|| mean(cycles, |cycle| cycle.gauges)),
+        }
     }
 }
 
@@ -53,17 +64,34 @@ pub struct Tared {
     pub after: Reading,
 }
 
-/// Takes the present readings of force sensor and gauges as zero. The arm has to stand. With `loaded` a force that is
-/// more than the drift of a sensor becomes zero too. Nothing moves and nothing is stored.
+/// Takes the present readings of force sensor and gauges as zero, or of those of them that the device has. Arm and hand
+/// have to stand. With `loaded` what is more than the drift of a sensor becomes zero too. Nothing moves and nothing is
+/// stored.
 ///
 /// # Errors
-/// [`ProcedureError::Moves`], [`ProcedureError::Loaded`], and as [`Client::request`].
+/// [`ProcedureError::NothingToTare`], [`ProcedureError::Moves`], [`ProcedureError::HandMoves`],
+/// [`ProcedureError::Loaded`], [`ProcedureError::Grips`], and as [`Client::request`].
 pub fn tare(client: &mut Client<Device>, loaded: bool) -> Result<Tared, ProcedureError> {
-    let known = client.status()?.wrench_zeroed == Some(true);
-    let before = Reading::of(&at_rest(client)?);
-    if known && !loaded && before.force() > LOAD {
-        return Err(ProcedureError::Loaded { force: before.force() });
+    let status = client.status()?;
+    let sensors = Sensors::of(&status);
+    if !sensors.wrist && !sensors.fingers {
+        return Err(ProcedureError::NothingToTare { hand: status.hand_stage });
+    }
+    let cycles = at_rest(client)?;
+    let before = sensors.read(&cycles);
+    let known = status.wrench_zeroed != Some(false);
+    if let Some([x, y, z]) = before.force_n.filter(|_| known && !loaded) {
+        let force = x.hypot(y).hypot(z);
+        if force > LOAD {
+            return Err(ProcedureError::Loaded { force });
+        }
+    }
+    let had_zero = cycles.iter().all(|cycle| cycle.flags & flags::TARED != 0);
+    if let Some(gauges) = before.gauges_nm.filter(|_| !client.hello().capabilities.arm && had_zero && !loaded)
+        && let Some(finger) = (0..gauges.len()).find(|finger| gauges[*finger].abs() > GRIP)
+    {
+        return Err(ProcedureError::Grips { finger, torque: gauges[finger] });
     }
     client.tare()?;
-    Ok(Tared { before: known.then_some(before), after: Reading::of(&at_rest(client)?) })
+    Ok(Tared { before: known.then_some(before), after: sensors.read(&at_rest(client)?) })
 }

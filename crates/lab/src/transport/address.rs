@@ -20,21 +20,8 @@ use std::str::FromStr;
 use link::can::DeviceNumber;
 
 use super::AddressError;
-use super::options::SimulatorOptions;
+use super::options::{SimulatorKind, SimulatorOptions};
 use super::serial::DEFAULT_BAUD;
-
-/// Which simulated device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SimulatorKind {
-    /// `sim:`, the firmware image under QEMU.
-    Qemu,
-    /// `sil:`, the application in this process.
-    InProcess,
-    /// `hand:`, the hand image under QEMU: a hand alone on its bus.
-    Hand,
-    /// `board:`, the image for the STM32H743 on the emulated board.
-    Board,
-}
 
 /// Where a device is.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -105,7 +92,7 @@ impl FromStr for Address {
 }
 
 fn simulated(kind: SimulatorKind, options: &str) -> Result<Address, AddressError> {
-    Ok(Address::Simulated(kind, SimulatorOptions::parse(options, kind == SimulatorKind::Board)?))
+    Ok(Address::Simulated(kind, SimulatorOptions::parse(options, kind)?))
 }
 
 impl fmt::Display for Address {
@@ -183,6 +170,11 @@ mod tests {
         assert_eq!(parse("sil:flash="), Err(AddressError::Option("flash=".into())));
         assert_eq!(parse("sim:speed=2"), Err(AddressError::Option("speed=2".into())));
         assert_eq!(parse("sim:world="), Err(AddressError::Option("world=".into())));
+        assert_eq!(parse("sil:seed=1,seed=2"), Err(AddressError::Twice("seed".into())));
+        assert_eq!(parse("sil:seed=1,world=simple,seed=1"), Err(AddressError::Twice("seed".into())));
+        assert_eq!(parse("board:report=a.json,report=b.json"), Err(AddressError::Twice("report".into())));
+        assert_eq!(parse("hand:flash=a.flash"), Err(AddressError::HandOption("flash=a.flash".into())));
+        assert_eq!(parse("hand:arm=3"), Err(AddressError::HandOption("arm=3".into())));
         assert_eq!(parse("sim:fault=hang@1"), Err(AddressError::Option("fault=hang@1".into())));
         assert_eq!(parse("sil:report=a.json"), Err(AddressError::Option("report=a.json".into())));
         for part in ["speed=2", "fault=", "report", "cancellation=maybe", "revision=2003", "revision=0x12345"] {

@@ -21,6 +21,12 @@ pub enum AddressError {
         "board: has the options of the other simulated devices, and report=FILE, cancellation=skipped|stuck, revision=0xNNNN and fault=KIND@MICROSECONDS[:ARGUMENT], not '{0}'"
     )]
     BoardOption(String),
+    /// An option that is given twice.
+    #[error("'{0}' is given twice; one of the two would be ignored")]
+    Twice(String),
+    /// An option that this simulated device does not have.
+    #[error("a hand alone has the options seed=NUMBER, world=empty, line=serial|can and bus=FILE, not '{0}'")]
+    HandOption(String),
     /// A value that is no number.
     #[error("'{0}': a whole number is expected, without a sign")]
     Number(String),

@@ -13,10 +13,10 @@ mod stream;
 
 use std::time::Duration;
 
-pub use address::{Address, SimulatorKind};
+pub use address::Address;
 pub use address_error::AddressError;
 pub use can::{CanProblem, CanTransport, SocketCan};
-pub use options::{BoardOptions, Cancellation, ChipOptions, LineKind, SimulatorOptions};
+pub use options::{BoardOptions, Cancellation, ChipOptions, LineKind, SimulatorKind, SimulatorOptions};
 pub use serial::SerialTransport;
 pub use stream::StreamTransport;
 

@@ -5,6 +5,19 @@ use std::path::PathBuf;
 
 use super::AddressError;
 
+/// Which simulated device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SimulatorKind {
+    /// `sim:`, the firmware image under QEMU.
+    Qemu,
+    /// `sil:`, the application in this process.
+    InProcess,
+    /// `hand:`, the hand image under QEMU: a hand alone on its bus.
+    Hand,
+    /// `board:`, the image for the STM32H743 on the emulated board.
+    Board,
+}
+
 /// The line of the host link of a simulated device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LineKind {
@@ -82,13 +95,24 @@ impl Cancellation {
 }
 
 impl SimulatorOptions {
-    /// Reads `seed=7,world=simple`; `is_board`: the options of the emulated board are allowed.
+    /// Reads `seed=7,world=simple` for a device of this kind.
     ///
     /// # Errors
-    /// [`AddressError`] for an option or a value that there is not.
-    pub(super) fn parse(text: &str, is_board: bool) -> Result<Self, AddressError> {
+    /// [`AddressError`] for an option or a value that there is not, and for an option that is given twice.
+    pub(super) fn parse(text: &str, kind: SimulatorKind) -> Result<Self, AddressError> {
+        let is_board = kind == SimulatorKind::Board;
         let mut options = Self::default();
+        let mut given: Vec<&str> = Vec::new();
         for part in text.split(',').filter(|part| !part.is_empty()) {
+            let name = part.split_once('=').map_or(part, |(name, _)| name);
+            // Several faults befall one chip.
+            if name != "fault" && given.contains(&name) {
+                return Err(AddressError::Twice(name.to_owned()));
+            }
+            given.push(name);
+            if kind == SimulatorKind::Hand && ["arm", "held", "flash", "faults"].contains(&name) {
+                return Err(AddressError::HandOption(part.to_owned()));
+            }
             match part.split_once('=').filter(|(_, value)| !value.is_empty()) {
                 Some(("seed", value)) => {
                     options.seed = Some(value.parse().map_err(|_| AddressError::Number(format!("seed={value}")))?);

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::source::Source;
 use super::{ErrorCode, Failure, Global, Output, connection};
+use crate::cmd::output;
 use canlog::{BusKind, Interface, InterfaceTotals, LogLine, Meaning, Reader, Summary};
 use lab::table::Table;
 
@@ -198,7 +199,7 @@ impl Printer {
 }
 
 fn broken(cause: Box<dyn std::error::Error + Send + Sync>) -> Failure {
-    Failure::new(ErrorCode::ResultNotWritten, "writing the result", cause)
+    Failure::of_file(ErrorCode::ResultNotWritten, output::WRITING, cause)
 }
 
 /// The summary of one interface for a terminal.
