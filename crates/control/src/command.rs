@@ -147,7 +147,8 @@ pub enum Refusal {
     HandTooFar = 14,
     /// There is no initialised hand.
     NoHand = 15,
-    /// The force at rest differs by more than 5 N from the weight of the hand: a load, a contact, or a sensor adrift.
+    /// The force at rest differs by more than 5 N from the weight of the hand (a run), or by more than 20 N from its last
+    /// zero (a tare): a load, a contact, or a sensor adrift.
     ForceAtRest = 16,
     /// A motor began to count anew: the positions no longer refer to the zero of the arm.
     ZeroLost = 17,
@@ -204,7 +205,9 @@ impl fmt::Display for Refusal {
             Refusal::NoExpectation => "the run uses force, and the primitive carries no expectation of it",
             Refusal::HandTooFar => "the hand is more than 0.15 rad away from where the primitive starts",
             Refusal::NoHand => "there is no initialised hand",
-            Refusal::ForceAtRest => "the force at rest is more than 5 N away from the weight of the hand",
+            Refusal::ForceAtRest => {
+                "the force at rest is not the weight of the hand: 5 N off for a run, 20 N off its last zero for a tare"
+            }
             Refusal::ZeroLost => "the zero of the arm is lost: zero it again",
         })
     }

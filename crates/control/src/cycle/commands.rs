@@ -19,6 +19,9 @@ use crate::units::JointPositions;
 /// Below this joint speed (rad/s) a movement may begin.
 const CALM: f64 = 0.2;
 
+/// Largest change of the force (N) that a person may tare away: two kilograms that are mounted behind the sensor.
+const MOUNTED: f64 = 20.0;
+
 impl<R: Real, const N: usize> Cycle<R, N> {
     /// Commands before any position is known.
     pub(super) fn command_blind(&mut self, command: Command) -> Result<(), Refusal> {
@@ -38,9 +41,16 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.wrench.forget_tare();
     }
 
-    fn tare(&mut self) -> Result<(), Refusal> {
+    fn tare(&mut self, measured: &Measured<'_, R>) -> Result<(), Refusal> {
         if self.supervisor.law() == State::Run {
             return Err(Refusal::WrongState);
+        }
+        if self.fastest(measured) > R::constant(CALM) {
+            return Err(Refusal::Moving);
+        }
+        // Whoever presses on the hand as it is tared shifts the force at which a contact stops the arm.
+        if self.wrench.is_tared() && self.wrench.rest_force().norm_squared() > R::constant(MOUNTED * MOUNTED) {
+            return Err(Refusal::ForceAtRest);
         }
         // What was measured long ago, perhaps in another posture, is no zero.
         let present = self.wrench.age().is_some_and(|age| age <= WRENCH_AGE);
@@ -65,7 +75,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 }
                 self.change(Trigger::Clear, measured)
             }
-            Command::Tare => self.tare(),
+            Command::Tare => self.tare(measured),
             Command::MoveHand { q, duration } => self.move_hand(&q, duration, measured),
             Command::Gravity => {
                 self.may_begin(measured)?;

@@ -236,3 +236,28 @@ fn a15_what_an_integral_had_gathered_is_gone_after_a_drop_of_the_safety_module()
     }
     recover(&mut rig);
 }
+
+/// The changes that make it fail: a tare does not ask if the arm moves; it does not ask what presses.
+#[test]
+fn b5_a_sensor_is_tared_at_rest_and_not_while_somebody_presses_on_it() {
+    let mut rig = holding();
+    rig.command(Command::Tare);
+    // As much as a tool that is mounted may weigh.
+    rig.plant.push[0] = 15.0;
+    rig.run_for(1.0);
+    rig.command(Command::Tare);
+    // It stands whatever presses.
+    let friction = rig.plant.coulomb;
+    rig.plant.coulomb *= 100.0;
+    rig.plant.push[0] = 40.0;
+    rig.run_for(1.0);
+    assert_eq!(rig.tick(Some(Command::Tare)).event, Some(Event::Refused(Refusal::ForceAtRest)));
+    rig.plant.push[0] = 15.0;
+    rig.run_for(1.0);
+    rig.plant.coulomb = friction;
+    let zero = rig.last.expect("ran").record.wrench[0];
+    assert!(zero.abs() < 0.5, "the zero from before holds: {zero}");
+    rig.command(Command::Approach { q: [0.0; 7], duration: 0.0 });
+    rig.run_for(0.7);
+    assert_eq!(rig.tick(Some(Command::Tare)).event, Some(Event::Refused(Refusal::Moving)));
+}

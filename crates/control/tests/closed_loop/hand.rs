@@ -34,6 +34,8 @@ fn an_arm_without_a_sensor_at_its_wrist_tares_the_gauges_of_its_hand() {
     rig.plant.deaf = true;
     // A hand that weighs nothing: what hangs on the arm is not what this is about.
     rig.plant.model = ArmModel::new(Payload::None);
+    // The pucks brake.
+    rig.plant.coulomb *= 100.0;
     rig.run_for(0.5);
     let alone = rig.tick(Some(Command::Tare)).event;
     assert_eq!(alone, Some(Event::Refused(Refusal::WrenchMissing)), "there is neither sensor nor hand");
