@@ -147,8 +147,8 @@ pub enum Refusal {
     HandTooFar = 14,
     /// There is no initialised hand.
     NoHand = 15,
-    /// The force at rest differs by more than 5 N from the weight of the hand (a run), or by more than 20 N from its last
-    /// zero (a tare): a load, a contact, or a sensor adrift.
+    /// The force at rest differs by more than 5 N from the weight of the hand (a run), or by more than 20 N from its
+    /// last zero (a tare): a load, a contact, or a sensor adrift.
     ForceAtRest = 16,
     /// A motor began to count anew: the positions no longer refer to the zero of the arm.
     ZeroLost = 17,
