@@ -58,6 +58,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "a joint is beyond its bound: a few dozen instructions",
     ),
     (
+        "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::press_no_further",
+        "a joint is beyond its bound: a few dozen instructions",
+    ),
+    (
         "control::sense::wrench::WrenchEstimator<R>::follow",
         "the memory is full; a few dozen instructions without a loop over time",
     ),
@@ -71,7 +75,9 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ),
     ("control::guard::disagreement::Disagreement<R>::is_pushed", "the force sensor is silent"),
     ("control::guard::disagreement::Disagreement<R>::encoder_stands_still", "a motor stands still"),
-    ("control::guard::disagreement::torques_of", "a motor stands still"),
+    ("control::guard::disagreement::Disagreement<R>::is_contradicted", "a push: a few dozen instructions"),
+    ("control::guard::monitor::unexplained", "a push: a few dozen instructions"),
+    ("control::guard::disagreement::torques_of", "a motor stands still, or a push"),
     ("control::cycle::hand::HandDrive<R>::is_gripping", "the memory is full; three fingers, a dozen instructions"),
     ("control::law::settling", "the memory is full; one joint in a cycle, a few dozen instructions"),
     ("control::law::hand::bound_closing", "the memory is full; three fingers, a few dozen instructions"),
