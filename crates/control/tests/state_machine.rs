@@ -280,6 +280,7 @@ fn codes_are_stable_and_unique() {
     for fault in Fault::ALL {
         assert_eq!(Fault::from_code(fault.code()), Some(fault));
         assert!(fault.explanation().len() > 5);
+        assert_eq!(fault.to_string(), fault.explanation());
     }
     for refusal in Refusal::ALL {
         assert_eq!(Refusal::from_code(refusal.code()), Some(refusal));

@@ -39,3 +39,14 @@ const fn version(text: &[u8]) -> u16 {
     assert!(version > 0, "the second line of the schema text begins with \"link \" and the version");
     version
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_version_is_the_whole_number_in_the_second_line() {
+        assert_eq!(version(b"schema 1\nlink 407\nrequest 5\n"), 407);
+        assert_eq!(version(b"\nlink 9\n"), 9);
+    }
+}

@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 #![warn(clippy::must_use_candidate)]
 
+mod bits;
 pub mod can;
 pub mod device;
 pub mod force_torque;

@@ -3,6 +3,7 @@
 //! There is no acknowledgement to a SET. A puck that gets several without a GET in between may drop some, and the
 //! safety module wants 10 ms between two.
 
+use crate::bits::appended;
 use crate::can::{CanFrame, CanId, Destination, Group, Node};
 use crate::property::PropertyId;
 use crate::state::MotorMode;
@@ -26,16 +27,21 @@ pub fn set_short(to: impl Into<Destination>, property: PropertyId, value: i16) -
     short(CanId::encode(Node::HOST, to), property, value)
 }
 
+/// Byte 0 of a SET and of a reply.
+const fn head(property: PropertyId) -> u8 {
+    SET_BIT | property.number()
+}
+
 /// SET bit and property, 0, then 32 bits little-endian: the same bytes serve SETs and replies.
 pub(crate) fn wide(id: CanId, property: PropertyId, value: i32) -> CanFrame {
     let [a, b, c, d] = value.to_le_bytes();
-    CanFrame::with_payload(id, [SET_BIT | property.number(), 0, a, b, c, d])
+    CanFrame::with_payload(id, [head(property), 0, a, b, c, d])
 }
 
 /// SET bit and property, 0, then 16 bits little-endian.
 pub(crate) fn short(id: CanId, property: PropertyId, value: i16) -> CanFrame {
     let [low, high] = value.to_le_bytes();
-    CanFrame::with_payload(id, [SET_BIT | property.number(), 0, low, high])
+    CanFrame::with_payload(id, [head(property), 0, low, high])
 }
 
 /// Torques for up to four pucks of a group in one frame, in the order of their PIDX 1..=4. Always DLC 8.
@@ -45,9 +51,9 @@ pub(crate) fn short(id: CanId, property: PropertyId, value: i16) -> CanFrame {
 /// passed: the pucks apply whatever arrives.
 #[must_use]
 pub fn packed_torques(group: Group, property: PropertyId, torques: [PuckTorque; 4]) -> CanFrame {
-    let fields = torques.iter().fold(0_u64, |packed, torque| packed << 14 | torque.bits());
+    let fields = torques.iter().fold(0_u64, |packed, torque| appended(packed, 14, torque.bits()));
     let [_, b1, b2, b3, b4, b5, b6, b7] = fields.to_be_bytes();
-    CanFrame::with_payload(CanId::encode(Node::HOST, group), [SET_BIT | property.number(), b1, b2, b3, b4, b5, b6, b7])
+    CanFrame::with_payload(CanId::encode(Node::HOST, group), [head(property), b1, b2, b3, b4, b5, b6, b7])
 }
 
 /// The frames that take the torque off: zero torque to arm and wrist, then MODE IDLE to the arm's pucks and to the

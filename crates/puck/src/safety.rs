@@ -4,6 +4,7 @@
 
 use core::fmt;
 
+use crate::bits::appended;
 use crate::can::{CanFrame, Node};
 use crate::message::set;
 use crate::property::{Property, PropertyTable};
@@ -64,7 +65,7 @@ impl Health {
         }
     }
 
-    const fn bits(self) -> u32 {
+    const fn bits(self) -> u64 {
         match self {
             Health::Safe => 1,
             Health::Warning => 2,
@@ -178,14 +179,15 @@ impl PendantState {
             Button::Idle => 2,
             Button::None => 3,
         };
-        let health = self.velocity.bits()
-            | self.torque.bits() << 3
-            | self.voltage.bits() << 6
-            | self.heartbeat.bits() << 9
-            | self.other.bits() << 12;
-        let [low, high, ..] = health.to_le_bytes();
-        let lights = self.idle_light as u8 | (self.activate_light as u8) << 1 | button << 2;
-        i32::from_le_bytes([low, high, self.segments, lights])
+        // From bit 27 down to bit 0; bit 15 is not used.
+        let bits = appended(button, 1, self.activate_light as u64);
+        let bits = appended(bits, 1, self.idle_light as u64);
+        let bits = appended(bits, 8, self.segments as u64);
+        let bits = appended(bits, 4, self.other.bits());
+        let bits = appended(bits, 3, self.heartbeat.bits());
+        let bits = appended(bits, 3, self.voltage.bits());
+        let bits = appended(bits, 3, self.torque.bits());
+        appended(bits, 3, self.velocity.bits()) as i32
     }
 
     /// The character on the seven-segment display; `None` for a pattern that no document names.

@@ -1,5 +1,6 @@
 //! Tactile frames of the hand: 24 cells of 12 bits in five frames, or the ten highest in one.
 
+use crate::bits::appended;
 use crate::can::{CanFrame, CanId, Group, Node};
 use crate::units::Real;
 
@@ -65,8 +66,10 @@ impl TactileBlock {
     /// Device side: the frame. Sequence and cells are cut to four and twelve bits.
     #[must_use]
     pub fn frame(&self, node: Node) -> CanFrame {
-        let bits =
-            self.cells.iter().fold((self.sequence & 0xF) as u64, |bits, cell| bits << 12 | (*cell & 0xFFF) as u64);
+        let bits = self
+            .cells
+            .iter()
+            .fold((self.sequence & 0xF) as u64, |bits, cell| appended(bits, 12, (*cell & 0xFFF) as u64));
         CanFrame::with_payload(CanId::encode(node, Group::TACTILE_FULL_REPLIES), bits.to_be_bytes())
     }
 }
@@ -100,7 +103,7 @@ impl TactileTop {
     #[must_use]
     pub fn frame(&self, node: Node) -> CanFrame {
         let map = (self.map & 0xFF_FFFF) as u64;
-        let bits = self.values.iter().fold(map, |bits, value| bits << 4 | (*value & 0xF) as u64);
+        let bits = self.values.iter().fold(map, |bits, value| appended(bits, 4, (*value & 0xF) as u64));
         CanFrame::with_payload(CanId::encode(node, Group::TACTILE_TOP_REPLIES), bits.to_be_bytes())
     }
 }

@@ -156,3 +156,15 @@ impl fmt::Display for Fault {
         formatter.write_str(self.explanation())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_device_finds_takes_the_torque_off_but_for_three_faults_that_stop_softly() {
+        let with = |reaction| Fault::ALL.into_iter().filter(move |fault| fault.reaction_outside() == reaction);
+        assert!(with(ReactionOutside::Soft).eq([Fault::Overrun]));
+        assert!(with(ReactionOutside::SoftUnlessLowering).eq([Fault::MotorHot, Fault::OtherPayload]));
+    }
+}

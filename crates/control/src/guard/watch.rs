@@ -41,8 +41,8 @@ const WRIST_CHANNELS: usize = 6;
 /// that stays on its foot.
 const CONTACT_MEMORY: f64 = 0.5;
 
-/// Averaged force that counts as contact (N): ten times what the sensor drifts by.
-const CONTACT: f64 = 1.0;
+/// Square of the averaged force that counts as contact (N^2): 1 N is ten times what the sensor drifts by.
+const CONTACT_SQUARE: f64 = 1.0;
 
 /// Share of its largest value to which the force falls when contact is lost. Successful runs keep a quarter at least,
 /// even those that give way.
@@ -197,7 +197,7 @@ impl<R: Real> Contact<R> {
         if square > self.largest {
             (self.largest, self.axis) = (square, strongest.0);
         }
-        self.lost = self.largest > R::constant(CONTACT * CONTACT) && square < self.largest * R::constant(KEPT * KEPT);
+        self.lost = self.largest > R::constant(CONTACT_SQUARE) && square < self.largest * R::constant(KEPT * KEPT);
         self.lost.then_some(self.axis)
     }
 }
@@ -428,5 +428,63 @@ mod tests {
     #[test]
     fn contact_that_ends_after_the_movement_is_not_lost() {
         assert!(released([5.0, 0.0, 0.0], 1.001, true) < 0.01);
+    }
+
+    /// One control period of a run whose averages are `average` on every channel, and so are its values.
+    fn settled(average: f64) -> Option<u8> {
+        let values = [average; STATISTICS_CHANNELS];
+        let mut watch = Watch { averages: values, ..Watch::new() };
+        watch.step(&still([1.0; STATISTICS_CHANNELS]), 1.5, &values, false).map(|surprise| surprise.channel)
+    }
+
+    #[test]
+    fn at_the_limit_nothing_is_told_one_bit_above_it_the_first_of_channels_that_deviate_alike() {
+        assert_eq!(settled(LIMIT), None);
+        assert_eq!(settled(LIMIT.next_up()), Some(0));
+    }
+
+    /// One control period of a contact whose averaged force is `force` (N), and so is that of this period; the largest
+    /// so far was along Z, with this square (N^2). Gives the axis of a force that is gone.
+    fn judged(force: [f64; 3], largest: f64, fingers: f64) -> (Option<usize>, Contact<f64>) {
+        let mut contact = Contact { force, largest, axis: 2, fingers: Some([0.0; 3]), ..Contact::new() };
+        let mut values = [0.0; STATISTICS_CHANNELS];
+        values[..3].copy_from_slice(&force);
+        values[FIRST_FINGER + 1] = fingers;
+        (contact.step(0.5, &values, true), contact)
+    }
+
+    #[test]
+    fn a_contact_is_more_than_a_newton_and_lost_below_a_seventh_of_it() {
+        assert_eq!(judged([0.0; 3], CONTACT_SQUARE, 0.0).0, None);
+        assert_eq!(judged([0.0; 3], CONTACT_SQUARE.next_up(), 0.0).0, Some(2));
+        // A power of two: the shares are exact.
+        assert_eq!(judged([8.0 * KEPT, 0.0, 0.0], 64.0, 0.0).0, None);
+        assert_eq!(judged([(8.0 * KEPT).next_down(), 0.0, 0.0], 64.0, 0.0).0, Some(2));
+    }
+
+    #[test]
+    fn a_hand_closes_once_a_finger_has_moved_by_more_than_a_tenth_of_a_radian() {
+        for moved in [CLOSING, -CLOSING] {
+            assert_eq!(judged([0.0; 3], 4.0, moved).0, Some(2));
+            assert_eq!(judged([0.0; 3], 4.0, moved * 1.001).0, None);
+        }
+    }
+
+    #[test]
+    fn a_force_is_that_of_the_axis_along_which_it_was_largest_first() {
+        assert_eq!(judged([0.0, 3.0, 3.0], 4.0, 0.0).1.axis, 1);
+        assert_eq!(judged([0.0, 2.0, 0.0], 4.0, 0.0).1.axis, 2);
+        assert_eq!(judged([0.0, 2.0_f64.next_up(), 0.0], 4.0, 0.0).1.axis, 1);
+    }
+
+    #[test]
+    fn a_force_of_a_kilonewton_is_no_sample() {
+        for (force, counts) in [(STRONGEST, false), (-STRONGEST, false), (STRONGEST.next_down(), true)] {
+            let mut contact = Contact::new();
+            let mut values = [0.0; STATISTICS_CHANNELS];
+            values[1] = force;
+            contact.step(0.5, &values, false);
+            assert_eq!(contact.force[1] != 0.0, counts, "{force}");
+        }
     }
 }

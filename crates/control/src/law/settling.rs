@@ -117,10 +117,9 @@ mod tests {
     use super::*;
     use crate::units::{JointPositions, JointVelocities};
 
-    /// The torque after so many seconds of this error (rad), closing at this speed (rad/s), and of this torque that is
-    /// given away in each control period (N m).
-    fn after(seconds: f64, error: f64, speed: f64, given: f64) -> Vector7<f64> {
-        let state = JointState {
+    /// Every joint at 0.3 rad, with this speed (rad/s).
+    fn moving(speed: f64) -> JointState<f64> {
+        JointState {
             q: JointPositions(Vector7::repeat(0.3)),
             dq: JointVelocities(Vector7::repeat(speed)),
             missing: 0,
@@ -130,7 +129,13 @@ mod tests {
             stuck: false,
             still: 0,
             displaced: false,
-        };
+        }
+    }
+
+    /// The torque after so many seconds of this error (rad), closing at this speed (rad/s), and of this torque that is
+    /// given away in each control period (N m).
+    fn after(seconds: f64, error: f64, speed: f64, given: f64) -> Vector7<f64> {
+        let state = moving(speed);
         let reference = JointReference::at_rest(JointPositions(Vector7::repeat(0.3 + error)));
         let mut settling = Settling::new();
         for _ in 0..(seconds / PERIOD) as u32 {
@@ -166,6 +171,43 @@ mod tests {
             assert_eq!(closing, Vector7::zeros());
             let leaving = after(1.0, 0.1 * sign, -0.5 * sign, 0.0);
             assert!(leaving.iter().all(|torque| torque * sign > 0.0), "{leaving}");
+        }
+    }
+
+    /// True if one turn of J1 moves the torque, whose error of this sign the joint at `speed` (rad/s) closes against a
+    /// plan at `plan` (rad/s), with the stiffness 1 N m/rad.
+    fn moves(sign: f64, speed: f64, plan: f64) -> bool {
+        let mut reference = JointReference::at_rest(JointPositions(Vector7::repeat(0.3 + 0.1 * sign)));
+        reference.dq = JointVelocities(Vector7::repeat(plan));
+        let mut settling = Settling::new();
+        settling.step(&Vector7::repeat(1.0), &moving(speed), &reference, |_| 0.0);
+        assert!(settling.torque()[0] * sign >= 0.0);
+        settling.torque()[0] != 0.0
+    }
+
+    #[test]
+    fn a_joint_that_closes_its_error_at_the_full_rate_is_still_moved_and_one_bit_faster_it_is_not() {
+        let full = CLAMP[0] / RISE;
+        for sign in [1.0, -1.0] {
+            assert!(moves(sign, full * sign, 0.0));
+            assert!(!moves(sign, full.next_up() * sign, 0.0));
+        }
+    }
+
+    #[test]
+    fn a_joint_that_only_follows_its_plan_closes_nothing() {
+        let fast = 2.0 * CLAMP[0];
+        for sign in [1.0, -1.0] {
+            assert!(moves(sign, fast * sign, fast * sign));
+            assert!(!moves(sign, fast * sign, 0.0));
+            assert!(!moves(sign, 0.0, -fast * sign));
+        }
+    }
+
+    #[test]
+    fn the_clamp_is_half_more_than_the_friction_of_the_model() {
+        for (clamp, friction) in CLAMP.into_iter().zip(wam7::FRICTION_COULOMB) {
+            assert!((clamp - 1.5 * friction).abs() < 1e-12 && clamp > 0.1);
         }
     }
 

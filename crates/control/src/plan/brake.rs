@@ -70,6 +70,13 @@ mod tests {
     }
 
     #[test]
+    fn a_creep_of_a_centimetre_a_second_is_left_alone_and_one_bit_more_is_not() {
+        let against = |speed| brake(&Vector3::new(0.0, speed, 0.0), &Vector3::new(0.0, -1.0, 0.0), 1.0);
+        assert_eq!(against(SLOW), None);
+        assert!(against(SLOW.next_up()).is_some());
+    }
+
+    #[test]
     fn no_force_takes_more_than_half_in_a_control_period_and_no_number_takes_nothing() {
         let [x, ..] = braked([0.07, 0.0, 0.0], [-1e3, 0.0, 0.0]).expect("it runs into something");
         assert!((x * RATE * RATE + 0.07 * LARGEST).abs() < 1e-12, "{x}");

@@ -1,7 +1,7 @@
 //! Classes of requests and replies, and numbers that never change their meaning: pinned one by one.
 
 use crate::samples::{replies, request_index, requests};
-use link::{ImageError, Refusal, Request};
+use link::{HandStage, HomeSource, ImageError, Refusal, Request, SecretState};
 
 /// True if a request can move the arm. One that does, and is old, is refused: forget one here and a host that was
 /// suspended moves an arm that somebody stands beside by now.
@@ -139,4 +139,47 @@ fn the_code_of_a_refusal_is_its_place_on_the_wire() {
     // The frozen ones, by which two versions find out that they do not fit.
     let frozen = [Refusal::LinkVersion, Refusal::Schema, Refusal::Model, Refusal::NoSession, Refusal::Busy];
     assert_eq!(frozen.map(|refusal| refusal.code() as u32), [0, 1, 2, 3, 4]);
+}
+
+#[test]
+fn every_refusal_has_a_reason_of_its_own_and_a_remedy() {
+    let reasons: std::collections::BTreeSet<&str> = Refusal::ALL.iter().map(|refusal| refusal.explanation()).collect();
+    assert_eq!(reasons.len(), Refusal::ALL.len());
+    for refusal in Refusal::ALL {
+        let (reason, remedy) = (refusal.explanation(), refusal.remedy());
+        // Half a sentence goes on behind others: neither a full stop nor a single word.
+        for words in [reason, remedy] {
+            assert!(words.contains(' ') && !words.ends_with('.'), "{refusal:?}: {words}");
+        }
+        assert_eq!(refusal.to_string(), reason);
+    }
+    assert_eq!(Refusal::Faulted.explanation(), "a fault is latched");
+    assert_eq!(Refusal::Faulted.remedy(), "remove the cause, then `tactus stop --clear-fault`");
+}
+
+#[test]
+fn the_stage_of_a_hand_is_found_by_its_number_and_has_words() {
+    use HandStage::{Absent, Failed, Initialising, NotInitialised, Ready};
+    let stages = [Absent, NotInitialised, Initialising, Ready, Failed];
+    for (code, stage) in (0..).zip(stages) {
+        assert_eq!((stage.code(), HandStage::from_code(code)), (code, Some(stage)));
+    }
+    assert_eq!(HandStage::from_code(5), None);
+    let words = ["absent", "not initialised", "initialising", "ready", "failed"];
+    assert_eq!(stages.map(HandStage::name), words);
+}
+
+#[test]
+fn whose_home_counts_and_what_is_known_of_a_secret_is_told_in_words() {
+    use HomeSource::{Damaged, Foreign, Model, Stored};
+    use SecretState::{Kept, NotOffered, Nothing, Unreadable};
+    let sources = [
+        "the model's",
+        "stored in the device",
+        "the model's, because the stored one is damaged",
+        "the model's, because the stored one is for another robot model or layout",
+    ];
+    assert_eq!([Model, Stored, Damaged, Foreign].map(HomeSource::name), sources);
+    let secrets = ["none", "kept", "unreadable", "not offered"];
+    assert_eq!([Nothing, Kept, Unreadable, NotOffered].map(SecretState::name), secrets);
 }

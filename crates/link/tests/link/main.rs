@@ -5,5 +5,6 @@ mod framing;
 mod golden;
 mod image;
 mod metadata;
+mod names;
 mod samples;
 mod segments;

@@ -1,7 +1,7 @@
 //! The metadata of a firmware image.
 
 use link::frame::CRC;
-use link::metadata::{METADATA_BYTES, MemoryRegion, MetadataError};
+use link::metadata::{METADATA_BYTES, MemoryRegion, MetadataError, chip};
 use link::{ImageMetadata, LINK_VERSION, SCHEMA_HASH};
 
 const SAMPLE: ImageMetadata<'static> = ImageMetadata {
@@ -85,4 +85,24 @@ fn a_region_contains_what_lies_inside_and_nothing_else() {
     assert!(!region.contains(u32::MAX, u32::MAX));
     let top = MemoryRegion { start: 0xFFFF_FF00, length: 0x100 };
     assert!(top.contains(0xFFFF_FF00, 0x100));
+}
+
+#[test]
+fn a_real_board_has_its_chip_and_an_emulated_one_none() {
+    assert_eq!(chip("nucleo-h743zi2"), Some("STM32H743ZITx"));
+    assert_eq!(chip("mps2-an500"), None);
+}
+
+#[test]
+fn a_description_that_is_not_read_is_told_why() {
+    for (error, words) in [
+        (MetadataError::Short, "is cut short"),
+        (MetadataError::Magic, "does not begin as one"),
+        (MetadataError::Layout(7), "has layout 7; this version reads 1"),
+        (MetadataError::Crc, "is damaged"),
+        (MetadataError::Flags(6), "has flags 0x0006, of which this version does not know all"),
+        (MetadataError::Text, "holds names that are not text"),
+    ] {
+        assert_eq!(error.to_string(), format!("the description of the image {words}"));
+    }
 }

@@ -31,6 +31,9 @@ fn the_transformation_equals_the_vectors() {
         for (got, expected) in motor.iter().zip(row.numbers::<f64, 7>("m", 1)) {
             assert!((got - expected).abs() <= 1e-12, "{}: {got} is not {expected}", row.at());
         }
+        for (got, expected) in transmission.joint_torques_from_motor(&motor).iter().zip(row.numbers::<f64, 7>("t", 1)) {
+            assert!((got - expected).abs() <= 1e-12, "{}: {got} is not {expected}", row.at());
+        }
 
         let [t1, t2, t3, t4, t5, t6, t7] = drives.torques(&motor).expect("finite");
         let lower = packed_torques(Group::ARM_TORQUES, PropertyId::TORQUE, [t1, t2, t3, t4]);
@@ -80,6 +83,24 @@ fn ratios_that_are_none_in_the_number_type_are_refused() {
         assert_eq!(Transmission::<f32>::new(&ratios).is_ok(), single, "{ratio:e}");
         assert_eq!(Transmission::<f64>::new(&ratios).is_ok(), double, "{ratio:e}");
     }
+}
+
+#[test]
+fn single_precision_saturates_and_rounds_as_double_precision_does() {
+    for (units, expected) in [(0.75, 0), (-0.25, -1), (8190.5, 8190), (8191.5, 8191), (-8190.5, -8191), (-9e3, -8191)] {
+        assert_eq!(PuckTorque::from_units(units).map(PuckTorque::units), Ok(expected), "{units}");
+        assert_eq!(PuckTorque::from_units(units as f32).map(PuckTorque::units), Ok(expected), "{units}");
+    }
+}
+
+#[test]
+fn torques_go_to_the_pucks_and_back_in_steps_of_one_unit() {
+    let torques = [0.5, -0.25, 1.0, -1.5, 0.125, -0.75, 0.0625];
+    let units = drives().torques(&torques).expect("finite");
+    assert_eq!(units.map(PuckTorque::units), [1350, -675, 2700, -4050, 812, -4875, 1092]);
+    let expected = [0.5, -0.25, 1.0, -1.5, 812.0 / 6500.0, -0.75, 1092.0 / 17474.0];
+    assert_eq!(drives().motor_torques::<f64>(&units), expected);
+    assert_eq!(drives().motor_torques::<f32>(&units), expected.map(|torque| torque as f32));
 }
 
 #[test]
