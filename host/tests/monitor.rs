@@ -108,6 +108,18 @@ fn what_is_not_known_is_null_for_a_script() {
     {
         assert!(idle[key].is_null(), "{key}: {}", idle[key]);
     }
+    // A cycle of the start-up carries zeros for what nobody has measured yet.
+    let mut starting = watch();
+    starting.cycle(Telemetry { cycle: 7, ..Telemetry::default() });
+    let line = serde_json::to_value(starting.line()).unwrap();
+    assert_eq!(line["cycle"], 7);
+    for key in ["q_rad", "dq_rad_s", "wrench_N_Nm", "hand_rad"] {
+        assert!(line[key].is_null(), "{key}: {line}");
+    }
+    // An arm without a sensor knows its angles.
+    starting.cycle(Telemetry { flags: flags::POSITIONS_KNOWN | flags::WRENCH_STALE, ..Telemetry::default() });
+    let line = serde_json::to_value(starting.line()).unwrap();
+    assert!(line["q_rad"].is_array() && line["wrench_N_Nm"].is_null(), "{line}");
     let fault = serde_json::to_value(fault().line()).unwrap();
     assert_eq!((&fault["state"], &fault["fault"]), (&"soft stop".into(), &"ContactForce".into()));
     assert_eq!((&fault["cycle"], &fault["adaptation"]), (&45_123.into(), &"at its limits".into()));

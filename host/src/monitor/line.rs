@@ -35,14 +35,15 @@ pub struct Line {
     pub cycle: Option<u32>,
     /// Phase of the primitive.
     pub phase: Option<f32>,
-    /// Joint angles, rad.
+    /// Joint angles, rad; null, as the velocities, before each was measured once.
     pub q_rad: Option<[f32; 7]>,
     /// Joint velocities, rad/s.
     pub dq_rad_s: Option<[f32; 7]>,
     /// Joint torques sent, N m.
     #[serde(rename = "tau_Nm")]
     pub tau_nm: Option<[f32; 7]>,
-    /// Force of the environment on the robot (N, world axes) and torque (N m, hand axes).
+    /// Force of the environment on the robot (N, world axes) and torque (N m, hand axes); null without a sensor, and
+    /// before the joint angles are known.
     #[serde(rename = "wrench_N_Nm")]
     pub wrench_n_nm: Option<[f32; 6]>,
     /// The same as the primitive expects it; null outside a run and without `--primitive`.

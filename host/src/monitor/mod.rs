@@ -117,6 +117,9 @@ impl Watch {
         let telemetry = self.telemetry.as_ref();
         let (now, worst) = self.computation_us();
         let hand = (self.status.hand_stage == HandStage::Ready).then_some(telemetry).flatten();
+        // Before every position was measured once, or without a sensor, a cycle carries zeros in their place.
+        let placed = telemetry.filter(|cycle| cycle.flags & flags::POSITIONS_KNOWN != 0);
+        let weighed = placed.filter(|cycle| cycle.flags & (flags::TARED | flags::WRENCH_STALE) != flags::WRENCH_STALE);
         Line {
             state: self.state(),
             fault: self.fault().map(|fault| format!("{fault:?}")),
@@ -125,10 +128,10 @@ impl Watch {
             progress: self.progress(),
             cycle: telemetry.map(|cycle| cycle.cycle),
             phase: telemetry.map(|cycle| cycle.phase),
-            q_rad: telemetry.map(|cycle| cycle.q),
-            dq_rad_s: telemetry.map(|cycle| cycle.dq),
+            q_rad: placed.map(|cycle| cycle.q),
+            dq_rad_s: placed.map(|cycle| cycle.dq),
             tau_nm: telemetry.map(|cycle| cycle.tau),
-            wrench_n_nm: telemetry.map(|cycle| cycle.wrench),
+            wrench_n_nm: weighed.map(|cycle| cycle.wrench),
             expected_n_nm: self.expected(),
             hand_rad: hand.map(|cycle| cycle.hand),
             hand_d_rad: hand.map(|cycle| cycle.hand_d),
