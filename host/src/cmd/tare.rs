@@ -8,7 +8,7 @@ use super::{Failure, Global, Table, connection};
 /// Options of `tare`.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
-    /// Make a zero of a load too; without it more than 1 N at rest is refused
+    /// Make a zero of a load too, up to 20 N; without it more than 1 N at rest is refused
     #[arg(long)]
     pub loaded: bool,
     /// I have brought the arm to its home pose: zero it there if need be
