@@ -70,14 +70,18 @@ fn a_command_that_is_interrupted_leaves_nothing_unfinished() {
     // A pipe into which nobody writes: the command waits for its input, and its output has begun.
     assert!(Command::new("mkfifo").arg(folder.join("demo.csv")).status().unwrap().success());
     let deadline = Instant::now() + Duration::from_secs(60);
-    for name in ["-INT", "-TERM", "-HUP"] {
-        let mut child = command(folder, "learn demo.csv -o a.toml").stderr(Stdio::null()).spawn().unwrap();
+    for name in ["INT", "TERM", "HUP"] {
+        // A shell that starts the tests in the background has them ignore Ctrl-C, and so would the command.
+        let mut child = Command::new("env");
+        child.arg(format!("--default-signal={name}")).arg(env!("CARGO_BIN_EXE_tactus")).current_dir(folder);
+        child.args(["learn", "demo.csv", "-o", "a.toml"]).stdin(Stdio::null()).stderr(Stdio::null());
+        let mut child = child.spawn().unwrap();
         while parts(folder).is_empty() {
             assert_eq!(child.try_wait().unwrap(), None, "it ended by itself");
             assert!(Instant::now() < deadline, "it has not begun");
             std::thread::yield_now();
         }
-        signal(&child, name);
+        signal(&child, &format!("-{name}"));
         assert_eq!(child.wait().unwrap().code(), None, "{name} ends it");
         assert_eq!(parts(folder), Vec::<String>::new(), "{name}");
     }
