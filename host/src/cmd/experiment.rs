@@ -200,7 +200,7 @@ mod work {
         let engine = engine(global)?;
         let object = command.object.as_deref().map(object).transpose()?;
         if command.figures_only && !out.is_dir() {
-            let cause = format!("there is no folder {}", out.display());
+            let cause = format!("there are no results in {}", out.display());
             return Err(Failure::new(ErrorCode::NoResults, "experiment refused", cause));
         }
         std::fs::create_dir_all(out).map_err(|cause| unwritable(out, cause))?;
