@@ -1,11 +1,11 @@
 //! The wrench with its sign and frames, and what the plan and the force controller do with it.
 
-use control::command::{Command, PoseFeedback, RunOptions};
+use control::command::{Command, RunOptions};
 use control::sense::deviation::TORQUE_DEAD_BAND;
 use control::time::periods;
 use control::{Fault, Real, State, flags};
 
-use crate::primitives::{DISPLACEMENT, Design, GOAL, START, configuration, primitive};
+use crate::primitives::{DISPLACEMENT, Design, GOAL, START, adapting, configuration, primitive};
 use crate::rig::Rig;
 
 /// A rig that holds `q`, tared.
@@ -321,13 +321,7 @@ fn running(wall: Option<(f64, f64)>) -> Rig<f32> {
     let design = Design { duration: 5.0, bent: false, expected: Some([0.0; 6]), ..Design::default() };
     rig.load(&primitive(&design)).expect("loads");
     rig.plant.wall = wall;
-    rig.command(Command::Run(RunOptions {
-        compliant: true,
-        feedback: true,
-        force_control: true,
-        pose_feedback: PoseFeedback::Planned,
-        ..RunOptions::default()
-    }));
+    rig.command(Command::Run(adapting()));
     rig
 }
 
@@ -390,13 +384,7 @@ fn b8_a_hand_that_gives_way_to_a_moment_rests_at_the_limit_of_its_wrist_and_is_n
         let design =
             Design { start: at, goal: at, duration: 6.0, expected: Some([0.0; 6]), bent: false, ..Design::default() };
         rig.load(&primitive(&design)).expect("loads");
-        rig.command(Command::Run(RunOptions {
-            compliant: true,
-            feedback: true,
-            force_control: true,
-            pose_feedback: PoseFeedback::Planned,
-            ..RunOptions::default()
-        }));
+        rig.command(Command::Run(adapting()));
         rig.run_for(0.5);
         for torque in [0.1, 0.15, 0.2] {
             let jacobian = rig.plant.frames().jacobian();

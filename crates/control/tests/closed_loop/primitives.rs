@@ -2,6 +2,7 @@
 
 use control::Payload;
 use control::Real;
+use control::command::{PoseFeedback, RunOptions};
 use control::model::{ArmModel, Frames};
 use control::plan::load;
 use control::plan::primitive::{
@@ -27,6 +28,17 @@ pub(crate) fn configuration<R: Real>(q: [f64; 7], hand: [f64; 4]) -> Configurati
     let pose = Frames::new(&model, &JointPositions::from_array(q)).tool_pose();
     let position = [0, 1, 2].map(|axis| R::constant(pose.position[axis]));
     rows(position, pose.orientation.0.map(R::constant), q.map(R::constant), hand.map(R::constant))
+}
+
+/// A compliant run that adapts, as `tactus run --mode adapt` asks for it.
+pub(crate) fn adapting() -> RunOptions {
+    RunOptions {
+        compliant: true,
+        feedback: true,
+        force_control: true,
+        pose_feedback: PoseFeedback::Planned,
+        ..RunOptions::default()
+    }
 }
 
 /// Weights that bend the position path by a few centimetres and the orientation by some degrees.

@@ -3,10 +3,10 @@
 use control::command::{Command, RunOptions};
 use control::time::periods;
 use control::units::Vector7;
-use control::{Fault, PoseFeedback, State};
+use control::{Fault, State};
 use nalgebra::{Rotation3, Unit, Vector3};
 
-use crate::primitives::{Design, START, primitive};
+use crate::primitives::{Design, START, adapting, primitive};
 use crate::rig::Rig;
 
 /// A posture to approach: all joints move.
@@ -177,18 +177,11 @@ fn b3_an_elbow_or_a_forearm_that_meets_something_stops_the_arm_within_a_fifth_of
 /// A compliant arm gives way: what is hard presses for longer, and with less.
 #[test]
 fn b3_a_compliant_arm_presses_with_its_elbow_no_harder_than_it_gives_way() {
-    let options = RunOptions {
-        compliant: true,
-        feedback: true,
-        force_control: true,
-        pose_feedback: PoseFeedback::Planned,
-        ..RunOptions::default()
-    };
     for duration in [3.0, 6.0] {
         for point in [Point::Elbow, Point::Forearm] {
             for share in [0.2, 0.5, 0.8] {
                 for stiffness in [1000.0, 10_000.0] {
-                    let contact = meet(Motion::Run(options, duration), point, share, stiffness);
+                    let contact = meet(Motion::Run(adapting(), duration), point, share, stiffness);
                     println!("{duration} s, {point:?} at {share}, {stiffness} N/m: {contact:.3?}");
                     assert!(contact.peak <= 50.0, "{contact:?}");
                 }
