@@ -120,8 +120,8 @@ fn draw_panel(drawing: &mut Drawing, frame: &Frame, panel: &Panel, members: &[(S
     if let Some((limit, words)) = &panel.limit {
         let [_, y] = frame.at([0.0, *limit]);
         drawing.dashed(&[[left, y], [frame.right(), y]], LIMIT, 1.6, [6.0, 4.0]);
-        // Beside the title, where no bar stands in its way.
-        drawing.text([frame.right(), top - 12.0], format!("dashed: {words}"), 14, Anchor::End, INK);
+        // Above the title, where neither a bar nor the title stands in its way.
+        drawing.text([frame.right(), top - 30.0], format!("dashed: {words}"), 14, Anchor::End, INK);
     }
     frame.axes(drawing);
 }
