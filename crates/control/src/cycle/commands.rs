@@ -79,11 +79,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Command::MoveHand { q, duration } => self.move_hand(&q, duration, measured),
             Command::Gravity => {
                 self.may_begin(measured)?;
-                self.change(Trigger::Gravity, measured)
+                self.arm(Trigger::Gravity, measured)
             }
             Command::Hold => {
                 self.may_begin(measured)?;
-                self.change(Trigger::Hold, measured)
+                self.arm(Trigger::Hold, measured)
             }
             Command::Approach { q: target, duration } => {
                 self.may_begin(measured)?;
@@ -107,6 +107,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                     approach = approach.slowed();
                 }
                 self.supervisor.take(Trigger::Approach, Fault::None)?;
+                self.tare_at_last();
                 self.begin_approach(approach, measured);
                 Ok(())
             }
@@ -166,6 +167,23 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         self.hand.move_to(&q.map(|q| R::constant(f64::from(q))), R::constant(f64::from(duration)));
         Ok(())
+    }
+
+    /// Takes a person's trigger that raises torque. The arm was braked until now, and nobody used the hand.
+    fn arm(&mut self, trigger: Trigger, measured: &Measured<'_, R>) -> Result<(), Refusal> {
+        let idle = self.supervisor.state() == State::Idle;
+        self.change(trigger, measured)?;
+        if idle {
+            self.tare_at_last();
+        }
+        Ok(())
+    }
+
+    /// Takes the zero of the sensors if there is none yet: the arm has not rested for long enough since its start-up.
+    fn tare_at_last(&mut self) {
+        if !self.wrench.is_tared() && self.wrench.tare() {
+            self.hand.tare_drift();
+        }
     }
 
     /// Conditions of every command that keeps or raises torque.

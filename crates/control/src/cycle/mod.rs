@@ -424,9 +424,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             force: self.wrench.raw_force(),
             wrench: &measured.wrench,
             lag: (lag.distance, lag.speed),
-            // The feedback fades in the meantime.
             wrench_lost: self.is_blind(u16::from(WRENCH_AGE) + FADE),
             blind: self.is_blind(WRENCH_AGE.into()) || self.is_bare() && self.armed_for >= laws::ARMING,
+            depends,
             carried: self.armed_for >= laws::ARMING,
             effort,
             shakes: self.observer.shakes(),

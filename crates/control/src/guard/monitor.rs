@@ -62,10 +62,12 @@ pub(crate) struct Observation<'a, R: Real> {
     pub(crate) wrench: &'a Wrench<R>,
     /// Distance (m) and speed (m/s) of the tool against the plan in the last cycle.
     pub(crate) lag: (R, R),
-    /// True if the wrench is gone for so long that nothing moves by itself any more.
+    /// True if the wrench is gone for so long that nothing moves by itself any more: the feedback has faded by then.
     pub(crate) wrench_lost: bool,
     /// True if no fresh force tells of a contact: the sensor is silent, or there is none.
     pub(crate) blind: bool,
+    /// True if the run bends or presses by what the sensor tells.
+    pub(crate) depends: bool,
     /// True once gravity is carried in full: until then the feedback carries it.
     pub(crate) carried: bool,
     /// Torques and motion that the law asks of the joints, where it feeds anything back.
@@ -152,9 +154,11 @@ impl<R: Real> Monitor<R> {
                     let environment = disagreement::torques_of(seen.wrench, seen.frames);
                     self.disagreement.encoder_stands_still(effort, &environment, seen.force, state.still)
                 };
+                // What the sensor tells where nothing goes by it may be a load that a tare took in another posture.
+                let told = if seen.depends { seen.force } else { R::constant(0.0) };
                 let pushed = if seen.blind {
                     self.disagreement.is_pushed(effort.feedback)
-                } else if follows_plan && seen.carried && disagreement::is_large(effort.feedback, seen.force) {
+                } else if follows_plan && seen.carried && disagreement::is_large(effort.feedback, told) {
                     self.disagreement.is_contradicted(effort.feedback, &unexplained(effort, seen))
                 } else {
                     self.disagreement.forget_pushes();
@@ -206,6 +210,7 @@ mod tests {
         lag: (f64, f64),
         wrench_lost: bool,
         blind: bool,
+        depends: bool,
         carried: bool,
         full_scale: bool,
         shakes: bool,
@@ -244,6 +249,7 @@ mod tests {
                 lag: (0.0, 0.0),
                 wrench_lost: false,
                 blind: false,
+                depends: true,
                 carried: true,
                 full_scale: false,
                 shakes: false,
@@ -279,6 +285,7 @@ mod tests {
                 lag: self.lag,
                 wrench_lost: self.wrench_lost,
                 blind: self.blind,
+                depends: self.depends,
                 carried: self.carried,
                 effort,
                 full_scale: self.full_scale,
@@ -523,5 +530,8 @@ mod tests {
         });
         let found = (1..=few_periods(0.5)).find(|_| scene.check(State::Run) == stop(Fault::UnseenContact));
         assert_eq!(found, Some(few_periods(0.2)));
+        // A load that a tare took in another posture: nothing goes by what the sensor tells.
+        scene.depends = false;
+        assert!((1..=few_periods(0.5)).all(|_| scene.check(State::Run) == NOTHING));
     }
 }

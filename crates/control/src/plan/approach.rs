@@ -35,7 +35,7 @@ pub const LONGEST_APPROACH: f64 = 120.0;
 pub const SETTLING: u16 = periods(1.0);
 
 /// Shortest approach (s), so that a move over no distance still begins and ends.
-const SHORTEST: f64 = 0.5;
+const SHORTEST: f64 = 1.0;
 
 /// A joint-space move in progress.
 #[derive(Clone, Copy, Debug)]

@@ -12,7 +12,7 @@ use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
 use crate::primitives::{DISPLACEMENT, Design, GOAL, ROTATION, START, primitive};
 use crate::rig::{Rig, cycle};
 
-const FEELING: RunOptions = RunOptions {
+pub(crate) const FEELING: RunOptions = RunOptions {
     goal: control::Goal::STORED,
     speed: 1.0,
     feedback: true,
@@ -37,7 +37,7 @@ fn holding(q: [f64; 7]) -> Rig<f32> {
 }
 
 /// A primitive that stays where it is.
-fn staying(q: [f64; 7]) -> Design {
+pub(crate) fn staying(q: [f64; 7]) -> Design {
     Design { duration: 4.0, start: q, goal: q, bent: false, expected: Some([0.0; 6]), ..Design::default() }
 }
 
@@ -287,76 +287,6 @@ fn b6_a_sensor_at_full_scale_stops_the_movement_within_ten_milliseconds() {
     assert_eq!(rig.cycle.fault(), Fault::ContactForce);
     assert!(rig.last.expect("ran").record.flags & flags::SENSOR_SATURATED != 0);
     assert!(cycles <= 3, "{cycles}");
-}
-
-#[test]
-fn b5_an_offset_at_rest_is_tared_if_small_and_refused_if_large() {
-    let start = |offset: f64, tared: bool| {
-        let mut rig = Rig::<f32>::new(START, 1);
-        rig.plant.glitch = if tared { 0.0 } else { offset };
-        rig.command(Command::Hold);
-        rig.run_for(2.0);
-        if tared {
-            rig.command(Command::Tare);
-            rig.plant.glitch = offset;
-            rig.run_for(1.0);
-        }
-        rig.load(&primitive(&staying(START))).expect("loads");
-        let event = rig.tick(Some(Command::Run(FEELING))).event;
-        rig.run_for(0.1);
-        let [x, y, z, ..] = rig.last.expect("ran").record.wrench.map(f64::from);
-        (event, Vector3::new(x, y, z).norm())
-    };
-    let refused = Some(Event::Refused(Refusal::ForceAtRest));
-    // Never tared: whatever the sensor shows, up to the limit, is its bias.
-    let (event, left) = start(4.0, false);
-    assert_eq!(event, Some(Event::Accepted));
-    assert!(left < 0.05, "{left}");
-    assert_eq!(start(6.0, false).0, refused);
-    // Tared: a drift is taken away, a load is not, and much is refused.
-    let (event, left) = start(0.8, true);
-    assert_eq!(event, Some(Event::Accepted));
-    assert!(left < 0.05, "{left}");
-    let (event, left) = start(3.0, true);
-    assert_eq!(event, Some(Event::Accepted));
-    assert!((left - 3.0).abs() < 0.05, "{left}");
-    assert_eq!(start(20.0, true).0, refused);
-}
-
-/// The change that makes it fail: a sensor that was silent while the arm was turned is tared by what it told before.
-#[test]
-fn b5_a_sensor_that_is_silent_is_not_tared() {
-    let mut rig = Rig::<f32>::new(START, 1);
-    rig.command(Command::Hold);
-    rig.run_for(2.0);
-    rig.command(Command::Gravity);
-    rig.plant.deaf = true;
-    for _ in 0..periods(3.0) {
-        rig.plant.q[5] += 1.0 / f64::from(periods(3.0));
-        rig.tick(None);
-    }
-    rig.run_for(0.5);
-    let refused = rig.tick(Some(Command::Tare)).event;
-    rig.plant.deaf = false;
-    rig.run_for(0.5);
-    let left = rig.last.expect("ran").record.wrench;
-    assert_eq!(refused, Some(Event::Refused(Refusal::WrenchMissing)));
-    assert!(left[..3].iter().all(|force| force.abs() < 0.1), "{left:?}");
-    rig.command(Command::Tare);
-}
-
-#[test]
-fn the_first_rest_after_start_up_is_the_zero_of_the_sensor() {
-    let mut rig = Rig::<f32>::new(START, 1);
-    rig.plant.glitch = 12.0;
-    // The pucks brake.
-    rig.plant.coulomb *= 100.0;
-    rig.run_for(0.1);
-    assert_eq!(rig.last.expect("ran").record.flags & flags::TARED, 0);
-    rig.run_for(0.3);
-    let record = rig.last.expect("ran").record;
-    assert!(record.flags & flags::TARED != 0);
-    assert!(record.wrench[..3].iter().all(|force| force.abs() < 0.05), "{:?}", record.wrench);
 }
 
 #[test]

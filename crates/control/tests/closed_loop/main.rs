@@ -15,6 +15,7 @@ mod primitives;
 mod rig;
 mod settling;
 mod shoves;
+mod tare;
 mod tracking;
 mod unseen;
 mod weight;

@@ -1,9 +1,10 @@
 //! Contacts of elbow and forearm, which the wrist's sensor does not see.
 
 use control::command::{Command, RunOptions};
+use control::model::arm::ArmModel;
 use control::time::periods;
 use control::units::Vector7;
-use control::{Fault, State};
+use control::{Fault, Payload, State};
 use nalgebra::{Rotation3, Unit, Vector3};
 
 use crate::primitives::{Design, START, adapting, primitive};
@@ -185,6 +186,40 @@ fn b3_a_compliant_arm_presses_with_its_elbow_no_harder_than_it_gives_way() {
                     println!("{duration} s, {point:?} at {share}, {stiffness} N/m: {contact:.3?}");
                     assert!(contact.peak <= 50.0, "{contact:?}");
                 }
+            }
+        }
+    }
+}
+
+/// Short ways in the shortest time that a plan takes, with more friction and weight than the model's, and a load that
+/// the tare took away.
+///
+/// The change that makes it fail: bars of two thirds.
+#[test]
+fn b3_a_short_approach_of_an_arm_that_touches_nothing_is_not_stopped() {
+    let outstretched = [0.0, 1.2, 0.0, 0.6, 0.0, 0.0, 0.0];
+    let ways = [
+        [-0.16, -0.12, 0.22, 0.16, -0.38, -0.04, 0.06],
+        [0.2; 7],
+        [0.1; 7],
+        [0.0, 0.15, 0.0, -0.25, 0.0, 0.1, 0.0],
+        [0.3, 0.0, -0.3, 0.0, 0.0, 0.0, 0.3],
+    ];
+    for (friction, weight, load) in [(0.0, 1.1, 0.0), (1.3, 1.1, 0.5), (1.0, 1.0, 0.7)] {
+        for posture in [START, outstretched] {
+            for way in ways.iter().flat_map(|way| [*way, way.map(|joint| -joint)]) {
+                let mut rig = Rig::<f32>::new(posture, 1);
+                rig.plant.coulomb *= friction;
+                rig.plant.model = ArmModel::disturbed(Payload::SensorAndHand, weight, load);
+                rig.plant.hand_weight += 9.81 * load;
+                rig.command(Command::Hold);
+                rig.run_for(2.0);
+                rig.command(Command::Tare);
+                let target: [f64; 7] = std::array::from_fn(|joint| posture[joint] + way[joint]);
+                rig.command(Command::Approach { q: target.map(|q| q as f32), duration: 0.0 });
+                rig.run_for(4.0);
+                let case = format!("friction {friction}, weight {weight}, {load} kg, {posture:?}, {way:?}");
+                assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None), "{case}");
             }
         }
     }
