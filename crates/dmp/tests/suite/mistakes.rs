@@ -1,6 +1,8 @@
 //! Mistakes of somebody who learns a movement for the first time: each has an error that names it.
 
-use dmp::fit::{Demonstration, DemonstrationError, FitError, FitOptions, PoseSamples, fit, fit_several, minimum_jerk};
+use dmp::fit::{
+    Demonstration, DemonstrationError, FitError, FitOptions, Learned, PoseSamples, fit, fit_several, minimum_jerk,
+};
 use dmp::{
     Coupling, FixedPoint, GainError, Group, OrientationError, Primitive, PrimitiveError, Quaternion, Rollout, Scalar,
     StartState, Stiffness,
@@ -148,6 +150,50 @@ fn path<T: Scalar>(primitive: &Primitive<T, 1, 0, 50>) -> Vec<f64> {
     let mut step =
         || rollout.step(primitive, primitive.control_period(), &Coupling::NONE).unwrap().points.x[0].to_f64();
     (0..ticks).map(|_| step()).collect()
+}
+
+/// Distance of the plan from a goal that came through the filter, and angle to it, long after the movement.
+fn missed<T: Scalar>(learned: &Learned<1, 1>) -> [f64; 2] {
+    let primitive: Primitive<T, 1, 1, 50> = learned.primitive().unwrap();
+    let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+    rollout.set_goal_filter(Some(T::from_f64(12.5))).unwrap();
+    rollout.set_goal_points([T::from_f64(10.0)]).unwrap();
+    let turn = Quaternion::from_rotation_vector(&[0.2, -0.3, 0.1]);
+    let goal = learned.goal.poses[0].orientation.product(&turn);
+    let [w, x, y, z] = goal.to_array().map(T::from_f64);
+    rollout.set_goal_orientation(&primitive, 0, Quaternion::new(w, x, y, z)).unwrap();
+    let mut plan = rollout.step(&primitive, primitive.control_period(), &Coupling::NONE).unwrap();
+    while plan.progress < T::from_f64(4.0) {
+        plan = rollout.step(&primitive, primitive.control_period(), &Coupling::NONE).unwrap();
+    }
+    let [w, x, y, z] = plan.poses[0].orientation.quaternion.to_array().map(T::to_f64);
+    let off = goal.conjugate().product(&Quaternion::new(w, x, y, z)).vector();
+    [(plan.points.x[0].to_f64() - 10.0).abs(), 2.0 * off.iter().map(|x| x * x).sum::<f64>().sqrt()]
+}
+
+#[test]
+fn a_filtered_goal_is_reached_however_slow_the_movement_is() {
+    // In a movement of 25 s a tick of the filter goes 5e-4 of the way: less than the last digit of an f32 long before
+    // the goal.
+    let (samples, duration) = (2001, 25.0);
+    let pose = turn(0.8, samples);
+    let points = minimum_jerk([0.0], [1.0], samples);
+    let demonstration = Demonstration::<1, 1>::new(duration / 2000.0, [pose], points).unwrap();
+    for orientation_error in [OrientationError::Quaternion, OrientationError::RotationVector] {
+        // Stiff: the plan shall not hide where its goal is.
+        let stiffness = Stiffness::uniform(10_000.0);
+        let options =
+            FitOptions { cutoff: None, control_period: Some(1e-3), stiffness, orientation_error, ..Default::default() };
+        let learned = fit(&demonstration, &options).unwrap();
+        for (name, [value, angle]) in [
+            ("f64", missed::<f64>(&learned)),
+            ("f32", missed::<f32>(&learned)),
+            ("fixed", missed::<FixedPoint>(&learned)),
+        ] {
+            assert!(value < 1e-5, "{orientation_error:?}, {name}: {value:e}");
+            assert!(angle < 5e-5, "{orientation_error:?}, {name}: {angle:e}");
+        }
+    }
 }
 
 #[test]
