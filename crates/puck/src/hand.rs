@@ -135,6 +135,11 @@ pub enum HandError {
     NotFinite,
     /// The firmware of the hand has no such property.
     Property(Property),
+    /// The IPNM of this digit (0..=3, in the order of [`Node::HAND`]) is not positive.
+    UnitsPerNewtonMetre {
+        /// Index of the digit.
+        digit: usize,
+    },
 }
 
 impl core::fmt::Display for HandError {
@@ -142,6 +147,9 @@ impl core::fmt::Display for HandError {
         match self {
             HandError::NotFinite => NotFinite.fmt(formatter),
             HandError::Property(property) => write!(formatter, "the hand has no property {}", property.mnemonic()),
+            HandError::UnitsPerNewtonMetre { digit } => {
+                write!(formatter, "digit {} of the hand reports an IPNM that is not positive", digit + 1)
+            }
         }
     }
 }
@@ -238,8 +246,11 @@ impl HandCommander {
     /// Barrett's library sends this frame with a wrong property number (0xFB instead of 0xAA); we do not copy that.
     ///
     /// # Errors
-    /// [`HandError::NotFinite`].
+    /// [`HandError::NotFinite`], [`HandError::UnitsPerNewtonMetre`]: such an IPNM would turn a torque round or lose it.
     pub fn torques<R: Real>(&self, torque: &[R; 4], units_per_newton_metre: &[i32; 4]) -> Result<CanFrame, HandError> {
+        if let Some(digit) = units_per_newton_metre.iter().position(|units| *units <= 0) {
+            return Err(HandError::UnitsPerNewtonMetre { digit });
+        }
         let mut units = [PuckTorque::ZERO; 4];
         for (((units, torque), ipnm), ratio) in units.iter_mut().zip(torque).zip(units_per_newton_metre).zip(RATIOS) {
             *units = PuckTorque::from_units(*torque * R::from_i32(*ipnm) / R::from_f64(ratio))?;

@@ -41,6 +41,18 @@ fn not_a_number_never_becomes_a_hand_command() {
     assert_eq!(commander().torques(&bad, &[20_000; 4]), Err(HandError::NotFinite));
 }
 
+/// A reply that failed often ends as 0 or -1: no torque, or one that opens where it should close.
+#[test]
+fn a_scale_that_is_not_positive_is_refused_with_its_digit() {
+    for (digit, scale) in [(0, 0), (3, -1), (1, i32::MIN)] {
+        let mut scales = [20_000; 4];
+        scales[digit] = scale;
+        let refused = HandError::UnitsPerNewtonMetre { digit };
+        assert_eq!(commander().torques(&[0.1; 4], &scales), Err(refused));
+        assert!(refused.to_string().contains("IPNM"));
+    }
+}
+
 #[test]
 fn hand_angles_equal_the_vectors() {
     for row in rows("hand_position") {
