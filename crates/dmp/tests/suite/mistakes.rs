@@ -4,8 +4,8 @@ use dmp::fit::{
     Demonstration, DemonstrationError, FitError, FitOptions, Learned, PoseSamples, fit, fit_several, minimum_jerk,
 };
 use dmp::{
-    Coupling, FixedPoint, GainError, Group, OrientationError, Primitive, PrimitiveError, Quaternion, Rollout, Scalar,
-    StartState, Stiffness,
+    Coupling, FixedPoint, GainError, Group, OrientationError, Part, Primitive, PrimitiveError, Quaternion, Rollout,
+    Scalar, StartState, Stiffness,
 };
 
 /// Normally distributed numbers, the same for the same seed.
@@ -152,6 +152,16 @@ fn path<T: Scalar>(primitive: &Primitive<T, 1, 0, 50>) -> Vec<f64> {
     (0..ticks).map(|_| step()).collect()
 }
 
+#[test]
+fn a_movement_in_millimetres_is_told_its_value_and_not_its_weights() {
+    for ([start, goal], part) in [([0.0, 500.0], Part::Goal), ([0.0, 1e6], Part::Goal), ([-500.0, 0.0], Part::Start)] {
+        let samples: Vec<f64> = minimum_jerk([start], [goal], 1001).into_iter().map(|[x]| x).collect();
+        let error = fit(&Demonstration::of_row(0.002, &samples).unwrap(), &FitOptions::default()).unwrap_err();
+        let place = PrimitiveError::TooLarge { part, group: Group::Points, index: 0 };
+        assert_eq!(error, FitError::Primitive(place), "{error}");
+    }
+}
+
 /// Distance of the plan from a goal that came through the filter, and angle to it, long after the movement.
 fn missed<T: Scalar>(learned: &Learned<1, 1>) -> [f64; 2] {
     let primitive: Primitive<T, 1, 1, 50> = learned.primitive().unwrap();
@@ -194,6 +204,47 @@ fn a_filtered_goal_is_reached_however_slow_the_movement_is() {
             assert!(angle < 5e-5, "{orientation_error:?}, {name}: {angle:e}");
         }
     }
+}
+
+#[test]
+fn number_types_agree_on_orientations_in_long_movements() {
+    let (samples, duration) = (2001, 100.0);
+    let mut pose = turn(0.8, samples);
+    // About several axes, and from an orientation that is none of them.
+    let start = Quaternion::from_rotation_vector(&[0.3, 0.6, 0.9]);
+    for (q, [x]) in pose.orientation.iter_mut().zip(minimum_jerk([0.0], [1.0], samples)) {
+        *q = start.product(q).product(&Quaternion::from_rotation_vector(&[0.9 * x, -0.4 * x, 0.7 * x * x]));
+    }
+    let demonstration = Demonstration::<0, 1>::new(duration / 2000.0, [pose], vec![[]; samples]).unwrap();
+    for (orientation_error, single, fixed) in
+        [(OrientationError::Quaternion, 5e-4, 1e-4), (OrientationError::RotationVector, 5e-6, 5e-5)]
+    {
+        let options =
+            FitOptions { cutoff: None, control_period: Some(1e-3), orientation_error, ..FitOptions::default() };
+        let learned = fit(&demonstration, &options).unwrap();
+        let exact = orientations::<f64>(&learned);
+        for (name, turned, bound) in
+            [("f32", orientations::<f32>(&learned), single), ("fixed", orientations::<FixedPoint>(&learned), fixed)]
+        {
+            let off = |(a, b): (&Quaternion<f64>, &Quaternion<f64>)| {
+                2.0 * a.conjugate().product(b).vector().iter().map(|x| x * x).sum::<f64>().sqrt()
+            };
+            let worst = exact.iter().zip(&turned).map(off).fold(0.0, f64::max);
+            assert!(worst < bound, "{orientation_error:?}, {name}: {worst:e}");
+        }
+    }
+}
+
+fn orientations<T: Scalar>(learned: &Learned<0, 1>) -> Vec<Quaternion<f64>> {
+    let primitive: Primitive<T, 0, 1, 50> = learned.primitive().unwrap();
+    let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+    let ticks = (1.2 * primitive.duration().to_f64() / primitive.control_period().to_f64()) as usize;
+    let mut step = || {
+        let plan = rollout.step(&primitive, primitive.control_period(), &Coupling::NONE).unwrap();
+        let [w, x, y, z] = plan.poses[0].orientation.quaternion.to_array().map(T::to_f64);
+        Quaternion::new(w, x, y, z)
+    };
+    (0..ticks).map(|_| step()).collect()
 }
 
 #[test]
