@@ -140,6 +140,8 @@ pub enum HandError {
         /// Index of the digit.
         digit: usize,
     },
+    /// A velocity does not fit into the 16 bits of V.
+    Range,
 }
 
 impl core::fmt::Display for HandError {
@@ -147,6 +149,7 @@ impl core::fmt::Display for HandError {
         match self {
             HandError::NotFinite => NotFinite.fmt(formatter),
             HandError::Property(property) => write!(formatter, "the hand has no property {}", property.mnemonic()),
+            HandError::Range => formatter.write_str("velocity does not fit into 16 bits"),
             HandError::UnitsPerNewtonMetre { digit } => {
                 write!(formatter, "digit {} of the hand reports an IPNM that is not positive", digit + 1)
             }
@@ -222,12 +225,13 @@ impl HandCommander {
     /// Move all digits with these velocities (rad/s) until told otherwise: V to each, then MODE 4.
     ///
     /// # Errors
-    /// [`HandError::NotFinite`].
+    /// [`HandError::NotFinite`]; [`HandError::Range`] beyond 32 767 counts/ms, 402 rad/s of a finger.
     pub fn velocity_move<R: Real>(&self, velocity: &[R; 4]) -> Result<[CanFrame; 5], HandError> {
         let mut values = [0; 4];
         for ((value, velocity), ratio) in values.iter_mut().zip(velocity).zip(RATIOS) {
             let counts = finite(*velocity)? * R::from_f64(ratio / RADIAN_PER_COUNT);
-            *value = (counts / R::from_f64(MILLISECONDS_PER_SECOND)).to_i32();
+            let counts = (counts / R::from_f64(MILLISECONDS_PER_SECOND)).to_i32();
+            *value = i16::try_from(counts).map_err(|_| HandError::Range)?.into();
         }
         let [a, b, c, d] = each_digit(self.velocity, &values);
         Ok([a, b, c, d, self.mode(MotorMode::Velocity)])

@@ -53,6 +53,17 @@ fn a_scale_that_is_not_positive_is_refused_with_its_digit() {
     }
 }
 
+/// V has 16 bits on the puck: 403 rad/s of a finger would arrive as a velocity the other way.
+#[test]
+fn a_velocity_that_its_property_cannot_hold_is_refused() {
+    for beyond in [403.0, -403.0, 1e30, f64::from(f32::MAX)] {
+        assert_eq!(commander().velocity_move(&[0.0, 0.0, beyond, 0.0]), Err(HandError::Range), "{beyond}");
+        assert_eq!(commander().velocity_move(&[0.0, 0.0, beyond as f32, 0.0]), Err(HandError::Range), "{beyond}");
+    }
+    assert!(commander().velocity_move(&[402.0, -402.0, 0.0, 2800.0]).is_ok());
+    assert!(HandError::Range.to_string().contains("16 bits"));
+}
+
 #[test]
 fn hand_angles_equal_the_vectors() {
     for row in rows("hand_position") {
