@@ -177,18 +177,30 @@ fn frame_of(id_text: &str, data_text: &str) -> Result<AnyFrame, LineError> {
     if long && id & ERROR_FLAG != 0 {
         return Ok(AnyFrame::Error { class: id & !ERROR_FLAG, data: bytes(data_text, 8)? });
     }
-    if let Some(length) = data_text.strip_prefix('R') {
-        let length = if length.is_empty() { Some(0) } else { u8::from_str_radix(length, 16).ok() };
-        let length = length.filter(|length| *length <= 8).ok_or_else(|| LineError::Data(data_text.to_owned()))?;
+    let no_data = || LineError::Data(data_text.to_owned());
+    // A length code of 9 to F may follow the eight bytes, or their number; it still means eight.
+    let (classic, code) = data_text.split_once('_').map_or((data_text, None), |(data, code)| (data, Some(code)));
+    let follows_eight = code.is_none_or(|code| matches!(code.as_bytes(), [b'9' | b'A'..=b'F' | b'a'..=b'f']));
+    if let Some(length) = classic.strip_prefix('R') {
+        let length = match length.as_bytes() {
+            [] => 0,
+            [digit @ b'0'..=b'8'] => digit - b'0',
+            _ => return Err(no_data()),
+        };
+        if code.is_some() && length != 8 || !follows_eight {
+            return Err(no_data());
+        }
         return Ok(AnyFrame::Remote { id, extended: long, length });
     }
     if let Some(rest) = data_text.strip_prefix('#') {
-        let (flags, rest) = rest.split_at_checked(1).ok_or_else(|| LineError::Data(data_text.to_owned()))?;
-        let flags = u8::from_str_radix(flags, 16).map_err(|_| LineError::Data(data_text.to_owned()))?;
+        let (flags, rest) = rest.split_at_checked(1).ok_or_else(no_data)?;
+        let flags = u8::from_str_radix(flags, 16).map_err(|_| no_data())?;
         return Ok(AnyFrame::FlexibleRate { id, flags, data: bytes(rest, 64)? });
     }
-    // A length code above 8 may follow an underscore; it still means eight bytes.
-    let data = bytes(data_text.split_once('_').map_or(data_text, |(data, _)| data), 8)?;
+    let data = bytes(classic, 8)?;
+    if code.is_some() && data.len() != 8 || !follows_eight {
+        return Err(no_data());
+    }
     if long {
         return Ok(AnyFrame::Extended { id, data });
     }
@@ -244,6 +256,16 @@ mod tests {
         assert_eq!(read("(1700000000.123456789)  can0  123#01  T").unwrap().time_us, 1_700_000_000_123_456);
         assert_eq!(read("(3.5) can0 123#01 R\r\n").unwrap().time_us, 3_500_000);
         assert_eq!(read("(7) can0 123#01.02").unwrap().frame.data(), [1, 2]);
+    }
+
+    #[test]
+    fn a_length_code_above_eight_is_read_as_eight_bytes_and_nothing_else_may_follow() {
+        assert_eq!(read("(1.0) can0 123#0102030405060708_B").unwrap().frame.data(), [1, 2, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(read("(1.0) can0 123#R8_F").unwrap().to_string(), "(0000000001.000000) can0 123#R8");
+        for data in ["0102030405060708_", "0102030405060708_8", "0102030405060708_BB", "0102_B", "R8_", "R7_B", "R+8"] {
+            let line = format!("(1.0) can0 123#{data}");
+            assert_eq!(read(&line), Err(LineError::Data(data.into())), "{line}");
+        }
     }
 
     #[test]

@@ -41,14 +41,15 @@ impl PuckState {
             return PropertyTable::monitor();
         }
         let version = self.version.unwrap_or(ASSUMED_FIRMWARE);
-        let known = match (self.node, self.role.map(Role::kind)) {
+        let table = match (self.node, self.role.map(Role::kind)) {
             // Sensors may report no usable role: the number decides.
             (Node::FORCE_TORQUE, _) => return PropertyTable::force_torque(),
-            (Node::SAFETY_MODULE, _) | (_, Some(Role::SAFETY)) => PropertyTable::safety(version),
-            _ => PropertyTable::motor(version),
+            (Node::SAFETY_MODULE, _) | (_, Some(Role::SAFETY)) => PropertyTable::safety,
+            _ => PropertyTable::motor,
         };
-        // A version that no table covers is told as the number it is; its properties are read as if it were newest.
-        known.unwrap_or(PropertyTable::monitor())
+        // A version that no table covers is told as the number it is; its properties are read as if it were newest. By
+        // the table of the boot loader MODE would be told as LOCK.
+        table(version).or_else(|_| table(ASSUMED_FIRMWARE)).unwrap_or(PropertyTable::monitor())
     }
 
     /// The property with this number. What the boot loader has not is looked up as if the main firmware ran: one may
@@ -121,6 +122,16 @@ mod tests {
     fn number_77_is_hold_on_new_firmware_and_en_on_old() {
         assert_eq!(name(&puck(&[(Property::Stat, 2), (Property::Vers, 190)]), 77), Some("HOLD"));
         assert_eq!(name(&puck(&[(Property::Stat, 2), (Property::Vers, 130)]), 77), Some("EN"));
+    }
+
+    #[test]
+    fn firmware_that_no_table_covers_is_read_as_the_newest_and_not_as_the_boot_loader() {
+        let unknown = puck(&[(Property::Stat, 2), (Property::Vers, 300)]);
+        assert_eq!(
+            (name(&unknown, 8), name(&unknown, 48), name(&unknown, 77)),
+            (Some("MODE"), Some("P"), Some("HOLD"))
+        );
+        assert_eq!(unknown.version(), Some(300));
     }
 
     #[test]

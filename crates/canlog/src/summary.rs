@@ -132,8 +132,10 @@ impl InterfaceTotals {
     #[must_use]
     pub fn sum(&self, interface: &str, pucks: &Decoder) -> Summary {
         let duration_us = self.last_us - self.first_us.unwrap_or(self.last_us);
+        // A frame counts where it ends; the part of it that was before the first time, or before its window, is not
+        // worth a share above one.
         let share = |bits: u64, over_us: u64| {
-            if over_us == 0 { 0.0 } else { bits as f64 / BITS_PER_MICROSECOND / over_us as f64 }
+            if over_us == 0 { 0.0 } else { (bits as f64 / BITS_PER_MICROSECOND / over_us as f64).min(1.0) }
         };
         let seconds = duration_us as f64 * 1e-6;
         let kinds = Kind::ALL.into_iter().filter_map(|kind| {
@@ -165,8 +167,7 @@ impl InterfaceTotals {
             frames: self.kinds.values().map(|(frames, _)| frames).sum(),
             unnamed: self.unnamed,
             load: share(self.bits, duration_us),
-            // A frame counts where it ends; the part of it that was before its window is not worth a share above one.
-            load_busiest: share(self.busiest_bits, WINDOW_US.min(duration_us)).min(1.0),
+            load_busiest: share(self.busiest_bits, WINDOW_US.min(duration_us)),
             kinds: kinds.collect(),
             nodes: nodes.collect(),
             cycle: self.cycle.sum(),
@@ -349,4 +350,23 @@ pub struct Summary {
     /// The control cycle, if there was one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cycle: Option<CycleSummary>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bus_is_never_busier_than_all_the_time_however_short_its_log_is() {
+        let mut totals = InterfaceTotals::default();
+        let mut decoder = Decoder::default();
+        for time_us in [1_000_000, 1_000_050] {
+            let frame = puck::get(Group::ARM, PropertyId::POSITION);
+            let line = LogLine { time_us, interface: "can0".into(), frame: AnyFrame::Data(frame) };
+            totals.note(&line, &decoder.read(&line.frame));
+        }
+        let sum = totals.sum("can0", &decoder);
+        let loads = [sum.load, sum.load_busiest].into_iter().chain(sum.kinds.iter().map(|kind| kind.load));
+        assert!(loads.into_iter().all(|load| load > 0.5 && load <= 1.0), "{sum:?}");
+    }
 }

@@ -48,9 +48,8 @@ pub struct PrimitiveTables<'a, T: Scalar, const D: usize, const P: usize> {
 
 /// One movement of `P` poses and `D` point rows with checked parameters; `N` = kernel capacity.
 ///
-/// Use [`fit::fit`](crate::fit::fit) to learn one, [`Rollout`](crate::Rollout) to run it. For f32, 17 rows and N = 100
-/// about 8 kB: keep it in a static or behind a reference on a small stack, and fill it there with
-/// [`Primitive::assign`].
+/// `fit::fit` learns one (feature `std`), [`Rollout`](crate::Rollout) runs it. For f32, 17 rows and N = 100 about 8 kB:
+/// keep it in a static or behind a reference on a small stack, and fill it there with [`Primitive::assign`].
 #[derive(Debug, PartialEq)]
 pub struct Primitive<T: Scalar, const D: usize, const P: usize, const N: usize> {
     fingerprint: u32,
@@ -223,8 +222,9 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
                 minimum_duration = shortest;
             }
         }
-        tables.check_weights(&basis, &systems)?;
+        // Before the weights: those of a movement learned in millimetres are too large too, and are not the mistake.
         let (start, goal) = tables.check_ends()?;
+        tables.check_weights(&basis, &systems)?;
         Ok(Checked { canonical, basis, systems, minimum_duration, start, goal })
     }
 

@@ -190,7 +190,15 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
             return T::ZERO;
         };
         if h != self.goal_fraction.0 {
-            self.goal_fraction = (h, T::ONE - T::exp(-a_g * h));
+            let (x, f) = (a_g * h, T::from_f64);
+            // Of a small exponent by the series: 1 - exp(-x) cancels, and in f32 the filter of a slow movement would be
+            // percents too fast or too slow. The first omitted term is 2e-12 of the sum.
+            let fraction = if x < f(1.0 / 256.0) {
+                x * (T::ONE - x * (f(1.0 / 2.0) - x * (f(1.0 / 6.0) - x * f(1.0 / 24.0))))
+            } else {
+                T::ONE - T::exp(-x)
+            };
+            self.goal_fraction = (h, fraction);
         }
         self.goal_fraction.1
     }
@@ -262,10 +270,10 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
             }
         } else {
             for rows in &mut self.poses {
-                rows.position.goal = rows.position.commanded;
+                rows.position.arrive();
                 rows.orientation.arrive();
             }
-            self.points.goal = self.points.commanded;
+            self.points.arrive();
         }
         self.goal_filter = rate;
         self.goal_fraction = (T::ZERO, T::ZERO);

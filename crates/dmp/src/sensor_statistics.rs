@@ -101,13 +101,14 @@ impl<T: Scalar, const CHANNELS: usize, const CAPACITY: usize> SensorStatistics<T
         self.mean.at(u)
     }
 
-    /// Spread (always positive) of each channel at progress `u`.
+    /// Spread of each channel at progress `u`: positive, but 0 without points.
     #[inline]
     pub fn spread_at(&self, u: T) -> [T; CHANNELS] {
         self.spread.at(u)
     }
 
     /// Returns the z-score of each value of `x` at progress `u`: its distance from the mean in spreads, with sign.
+    /// Without points there is nothing to divide by: ask [`is_empty`](Self::is_empty) first.
     #[inline]
     pub fn z_score(&self, u: T, x: &[T; CHANNELS]) -> [T; CHANNELS] {
         let (mean, spread) = (self.mean.at(u), self.spread.at(u));

@@ -79,6 +79,13 @@ impl FlashPort {
     }
 }
 
+/// Whole units of the flash from `from` to `to`. As `NorFlash` promises: a call that names others changes nothing.
+fn within(from: u32, to: u32, unit: usize) -> Result<(), FlashError> {
+    let (from, to) = (crate::place(from)?, crate::place(to)?);
+    let whole = from <= to && to <= FLASH_BYTES && from.is_multiple_of(unit) && to.is_multiple_of(unit);
+    if whole { Ok(()) } else { Err(FlashError::Place) }
+}
+
 impl NorFlashError for FlashError {
     fn kind(&self) -> NorFlashErrorKind {
         match self {
@@ -110,6 +117,7 @@ impl NorFlash for FlashPort {
     const ERASE_SIZE: usize = SECTOR_BYTES;
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        within(from, to, SECTOR_BYTES)?;
         for sector in (from..to).step_by(SECTOR_BYTES) {
             let begun = self.chip.lock().erase_sector(self.clock.now(), sector);
             self.until(begun).await?;
@@ -118,10 +126,46 @@ impl NorFlash for FlashPort {
     }
 
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        let length = u32::try_from(bytes.len()).map_err(|_| FlashError::Place)?;
+        within(offset, offset.checked_add(length).ok_or(FlashError::Place)?, WORD_BYTES)?;
         for (word, at) in bytes.chunks(WORD_BYTES).zip((offset..).step_by(WORD_BYTES)) {
             let begun = self.chip.lock().write_word(self.clock.now(), at, word);
             self.until(begun).await?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::pin::pin;
+    use std::task::{Context, Poll, Waker};
+
+    use super::*;
+    use crate::{Flash, FlashTimes};
+
+    fn end<T>(operation: impl Future<Output = T>) -> T {
+        match pin!(operation).poll(&mut Context::from_waker(Waker::noop())) {
+            Poll::Ready(outcome) => outcome,
+            Poll::Pending => panic!("a flash without times is never busy"),
+        }
+    }
+
+    #[test]
+    fn what_is_not_whole_sectors_or_words_of_the_flash_is_refused_before_anything_is_changed() {
+        let chip = FlashChip::new(Flash::with_content(vec![0; FLASH_BYTES - WORD_BYTES], FlashTimes::NONE));
+        let before = chip.lock().content().to_vec();
+        let mut port = FlashPort::new(chip.clone(), VirtualClock::default());
+        let (sector, flash) = (SECTOR_BYTES as u32, FLASH_BYTES as u32);
+        for (from, to) in [(0, 1), (0, sector + 1), (1, sector), (sector, 0), (flash - sector, flash + sector)] {
+            assert_eq!(end(port.erase(from, to)), Err(FlashError::Place), "{from} {to}");
+        }
+        let last = flash - WORD_BYTES as u32;
+        for (offset, length) in [(last, 33), (last, 31), (last + 1, 32), (last, 64), (u32::MAX - 31, 64)] {
+            assert_eq!(end(port.write(offset, &vec![1; length])), Err(FlashError::Place), "{offset} {length}");
+        }
+        assert!(chip.lock().content() == before, "something was changed");
+        assert_eq!(end(port.write(last, &[1; WORD_BYTES])), Ok(()));
+        assert_eq!(end(port.erase(flash - sector, flash)), Ok(()));
     }
 }

@@ -141,8 +141,9 @@ impl FingerTables {
         if !self.expected.is_empty() {
             recorded_filter::check(self.filter_cut_off).map_err(Unfit::Filter)?;
             let torque = |value: &f32| f64::from(*value).abs() <= FINGER_TORQUE_MAX;
-            let duration = f64::from(self.recorded_duration);
-            let is_real = duration > 0.0 && duration <= bounds::LONGEST_DURATION;
+            // As the number it becomes: what is below the resolution is 0 there.
+            let duration = from_real(self.recorded_duration);
+            let is_real = duration > ZERO && duration <= constant(bounds::LONGEST_DURATION);
             if !(is_real && self.expected.iter().flatten().all(torque)) {
                 return Err(Unfit::Expectation);
             }

@@ -135,6 +135,13 @@ pub enum HandError {
     NotFinite,
     /// The firmware of the hand has no such property.
     Property(Property),
+    /// The IPNM of this digit (0..=3, in the order of [`Node::HAND`]) is not positive.
+    UnitsPerNewtonMetre {
+        /// Index of the digit.
+        digit: usize,
+    },
+    /// A velocity does not fit into the 16 bits of V.
+    Range,
 }
 
 impl core::fmt::Display for HandError {
@@ -142,6 +149,10 @@ impl core::fmt::Display for HandError {
         match self {
             HandError::NotFinite => NotFinite.fmt(formatter),
             HandError::Property(property) => write!(formatter, "the hand has no property {}", property.mnemonic()),
+            HandError::Range => formatter.write_str("velocity does not fit into 16 bits"),
+            HandError::UnitsPerNewtonMetre { digit } => {
+                write!(formatter, "digit {} of the hand reports an IPNM that is not positive", digit + 1)
+            }
         }
     }
 }
@@ -214,12 +225,13 @@ impl HandCommander {
     /// Move all digits with these velocities (rad/s) until told otherwise: V to each, then MODE 4.
     ///
     /// # Errors
-    /// [`HandError::NotFinite`].
+    /// [`HandError::NotFinite`]; [`HandError::Range`] beyond 32 767 counts/ms, 402 rad/s of a finger.
     pub fn velocity_move<R: Real>(&self, velocity: &[R; 4]) -> Result<[CanFrame; 5], HandError> {
         let mut values = [0; 4];
         for ((value, velocity), ratio) in values.iter_mut().zip(velocity).zip(RATIOS) {
             let counts = finite(*velocity)? * R::from_f64(ratio / RADIAN_PER_COUNT);
-            *value = (counts / R::from_f64(MILLISECONDS_PER_SECOND)).to_i32();
+            let counts = (counts / R::from_f64(MILLISECONDS_PER_SECOND)).to_i32();
+            *value = i16::try_from(counts).map_err(|_| HandError::Range)?.into();
         }
         let [a, b, c, d] = each_digit(self.velocity, &values);
         Ok([a, b, c, d, self.mode(MotorMode::Velocity)])
@@ -238,8 +250,11 @@ impl HandCommander {
     /// Barrett's library sends this frame with a wrong property number (0xFB instead of 0xAA); we do not copy that.
     ///
     /// # Errors
-    /// [`HandError::NotFinite`].
+    /// [`HandError::NotFinite`], [`HandError::UnitsPerNewtonMetre`]: such an IPNM would turn a torque round or lose it.
     pub fn torques<R: Real>(&self, torque: &[R; 4], units_per_newton_metre: &[i32; 4]) -> Result<CanFrame, HandError> {
+        if let Some(digit) = units_per_newton_metre.iter().position(|units| *units <= 0) {
+            return Err(HandError::UnitsPerNewtonMetre { digit });
+        }
         let mut units = [PuckTorque::ZERO; 4];
         for (((units, torque), ipnm), ratio) in units.iter_mut().zip(torque).zip(units_per_newton_metre).zip(RATIOS) {
             *units = PuckTorque::from_units(*torque * R::from_i32(*ipnm) / R::from_f64(ratio))?;

@@ -1,9 +1,11 @@
 //! Mistakes of somebody who learns a movement for the first time: each has an error that names it.
 
-use dmp::fit::{Demonstration, DemonstrationError, FitError, FitOptions, PoseSamples, fit, fit_several, minimum_jerk};
+use dmp::fit::{
+    Demonstration, DemonstrationError, FitError, FitOptions, Learned, PoseSamples, fit, fit_several, minimum_jerk,
+};
 use dmp::{
-    Coupling, FixedPoint, GainError, Group, OrientationError, Primitive, PrimitiveError, Quaternion, Rollout, Scalar,
-    StartState, Stiffness,
+    Coupling, FixedPoint, GainError, Group, OrientationError, Part, Primitive, PrimitiveError, Quaternion, Rollout,
+    Scalar, StartState, Stiffness,
 };
 
 /// Normally distributed numbers, the same for the same seed.
@@ -147,6 +149,101 @@ fn path<T: Scalar>(primitive: &Primitive<T, 1, 0, 50>) -> Vec<f64> {
     let ticks = (1.2 * primitive.duration().to_f64() / primitive.control_period().to_f64()) as usize;
     let mut step =
         || rollout.step(primitive, primitive.control_period(), &Coupling::NONE).unwrap().points.x[0].to_f64();
+    (0..ticks).map(|_| step()).collect()
+}
+
+#[test]
+fn a_movement_in_millimetres_is_told_its_value_and_not_its_weights() {
+    for ([start, goal], part) in [([0.0, 500.0], Part::Goal), ([0.0, 1e6], Part::Goal), ([-500.0, 0.0], Part::Start)] {
+        let samples: Vec<f64> = minimum_jerk([start], [goal], 1001).into_iter().map(|[x]| x).collect();
+        let error = fit(&Demonstration::of_row(0.002, &samples).unwrap(), &FitOptions::default()).unwrap_err();
+        let place = PrimitiveError::TooLarge { part, group: Group::Points, index: 0 };
+        assert_eq!(error, FitError::Primitive(place), "{error}");
+    }
+}
+
+/// Distance of the plan from a goal that came through the filter, and angle to it, long after the movement.
+fn missed<T: Scalar>(learned: &Learned<1, 1>) -> [f64; 2] {
+    let primitive: Primitive<T, 1, 1, 50> = learned.primitive().unwrap();
+    let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+    rollout.set_goal_filter(Some(T::from_f64(12.5))).unwrap();
+    rollout.set_goal_points([T::from_f64(10.0)]).unwrap();
+    let turn = Quaternion::from_rotation_vector(&[0.2, -0.3, 0.1]);
+    let goal = learned.goal.poses[0].orientation.product(&turn);
+    let [w, x, y, z] = goal.to_array().map(T::from_f64);
+    rollout.set_goal_orientation(&primitive, 0, Quaternion::new(w, x, y, z)).unwrap();
+    let mut plan = rollout.step(&primitive, primitive.control_period(), &Coupling::NONE).unwrap();
+    while plan.progress < T::from_f64(4.0) {
+        plan = rollout.step(&primitive, primitive.control_period(), &Coupling::NONE).unwrap();
+    }
+    let [w, x, y, z] = plan.poses[0].orientation.quaternion.to_array().map(T::to_f64);
+    let off = goal.conjugate().product(&Quaternion::new(w, x, y, z)).vector();
+    [(plan.points.x[0].to_f64() - 10.0).abs(), 2.0 * off.iter().map(|x| x * x).sum::<f64>().sqrt()]
+}
+
+#[test]
+fn a_filtered_goal_is_reached_however_slow_the_movement_is() {
+    // In a movement of 25 s a tick of the filter goes 5e-4 of the way: less than the last digit of an f32 long before
+    // the goal.
+    let (samples, duration) = (2001, 25.0);
+    let pose = turn(0.8, samples);
+    let points = minimum_jerk([0.0], [1.0], samples);
+    let demonstration = Demonstration::<1, 1>::new(duration / 2000.0, [pose], points).unwrap();
+    for orientation_error in [OrientationError::Quaternion, OrientationError::RotationVector] {
+        // Stiff: the plan shall not hide where its goal is.
+        let stiffness = Stiffness::uniform(10_000.0);
+        let options =
+            FitOptions { cutoff: None, control_period: Some(1e-3), stiffness, orientation_error, ..Default::default() };
+        let learned = fit(&demonstration, &options).unwrap();
+        for (name, [value, angle]) in [
+            ("f64", missed::<f64>(&learned)),
+            ("f32", missed::<f32>(&learned)),
+            ("fixed", missed::<FixedPoint>(&learned)),
+        ] {
+            assert!(value < 1e-5, "{orientation_error:?}, {name}: {value:e}");
+            assert!(angle < 5e-5, "{orientation_error:?}, {name}: {angle:e}");
+        }
+    }
+}
+
+#[test]
+fn number_types_agree_on_orientations_in_long_movements() {
+    let (samples, duration) = (2001, 100.0);
+    let mut pose = turn(0.8, samples);
+    // About several axes, and from an orientation that is none of them.
+    let start = Quaternion::from_rotation_vector(&[0.3, 0.6, 0.9]);
+    for (q, [x]) in pose.orientation.iter_mut().zip(minimum_jerk([0.0], [1.0], samples)) {
+        *q = start.product(q).product(&Quaternion::from_rotation_vector(&[0.9 * x, -0.4 * x, 0.7 * x * x]));
+    }
+    let demonstration = Demonstration::<0, 1>::new(duration / 2000.0, [pose], vec![[]; samples]).unwrap();
+    for (orientation_error, single, fixed) in
+        [(OrientationError::Quaternion, 5e-4, 1e-4), (OrientationError::RotationVector, 5e-6, 5e-5)]
+    {
+        let options =
+            FitOptions { cutoff: None, control_period: Some(1e-3), orientation_error, ..FitOptions::default() };
+        let learned = fit(&demonstration, &options).unwrap();
+        let exact = orientations::<f64>(&learned);
+        for (name, turned, bound) in
+            [("f32", orientations::<f32>(&learned), single), ("fixed", orientations::<FixedPoint>(&learned), fixed)]
+        {
+            let off = |(a, b): (&Quaternion<f64>, &Quaternion<f64>)| {
+                2.0 * a.conjugate().product(b).vector().iter().map(|x| x * x).sum::<f64>().sqrt()
+            };
+            let worst = exact.iter().zip(&turned).map(off).fold(0.0, f64::max);
+            assert!(worst < bound, "{orientation_error:?}, {name}: {worst:e}");
+        }
+    }
+}
+
+fn orientations<T: Scalar>(learned: &Learned<0, 1>) -> Vec<Quaternion<f64>> {
+    let primitive: Primitive<T, 0, 1, 50> = learned.primitive().unwrap();
+    let mut rollout = Rollout::start(&primitive, &StartState::demonstrated(&primitive)).unwrap();
+    let ticks = (1.2 * primitive.duration().to_f64() / primitive.control_period().to_f64()) as usize;
+    let mut step = || {
+        let plan = rollout.step(&primitive, primitive.control_period(), &Coupling::NONE).unwrap();
+        let [w, x, y, z] = plan.poses[0].orientation.quaternion.to_array().map(T::to_f64);
+        Quaternion::new(w, x, y, z)
+    };
     (0..ticks).map(|_| step()).collect()
 }
 

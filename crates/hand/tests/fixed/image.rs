@@ -120,6 +120,18 @@ fn a_refused_upload_leaves_the_movement_that_was_there() {
 }
 
 #[test]
+fn a_recorded_duration_below_the_resolution_of_the_numbers_leaves_the_movement_that_was_there() {
+    let mut primitive = Movement::closing(10, 5.0, 0.3).feeling().fixed();
+    let movement = Movement { recorded_duration: 1e-12, ..Movement::closing(20, 5.0, 0.3).feeling() };
+    let mut tables = Box::new(FingerTables::EMPTY);
+    let image = movement.image("grip");
+    ImageReader::new(image.len() as u32).take(&image, &mut tables);
+    assert!(primitive.assign(&tables).is_err());
+    assert!(primitive.is_whole() && primitive.has_expectation());
+    assert_eq!(primitive.movement().basis().count(), 10);
+}
+
+#[test]
 fn random_bytes_are_refused_and_nothing_panics() {
     let mut random = Random(42);
     let sound = Movement::closing(10, 5.0, 0.3).feeling().image("grip");

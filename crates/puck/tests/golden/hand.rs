@@ -41,6 +41,29 @@ fn not_a_number_never_becomes_a_hand_command() {
     assert_eq!(commander().torques(&bad, &[20_000; 4]), Err(HandError::NotFinite));
 }
 
+/// A reply that failed often ends as 0 or -1: no torque, or one that opens where it should close.
+#[test]
+fn a_scale_that_is_not_positive_is_refused_with_its_digit() {
+    for (digit, scale) in [(0, 0), (3, -1), (1, i32::MIN)] {
+        let mut scales = [20_000; 4];
+        scales[digit] = scale;
+        let refused = HandError::UnitsPerNewtonMetre { digit };
+        assert_eq!(commander().torques(&[0.1; 4], &scales), Err(refused));
+        assert!(refused.to_string().contains("IPNM"));
+    }
+}
+
+/// V has 16 bits on the puck: 403 rad/s of a finger would arrive as a velocity the other way.
+#[test]
+fn a_velocity_that_its_property_cannot_hold_is_refused() {
+    for beyond in [403.0, -403.0, 1e30, f64::from(f32::MAX)] {
+        assert_eq!(commander().velocity_move(&[0.0, 0.0, beyond, 0.0]), Err(HandError::Range), "{beyond}");
+        assert_eq!(commander().velocity_move(&[0.0, 0.0, beyond as f32, 0.0]), Err(HandError::Range), "{beyond}");
+    }
+    assert!(commander().velocity_move(&[402.0, -402.0, 0.0, 2800.0]).is_ok());
+    assert!(HandError::Range.to_string().contains("16 bits"));
+}
+
 #[test]
 fn hand_angles_equal_the_vectors() {
     for row in rows("hand_position") {
