@@ -118,12 +118,13 @@ impl<B: Board, C: Controller> SlotTask<B, C> {
         let now = self.clock.now_us();
         let (mut late, mut lost, mut off) = (false, false, false);
         if self.slot == Slot::Slow {
-            // The torques of the control slot must have left before another frame is queued behind them.
+            // Torques that wait while nothing is on its way were not sent in time. Those that wait behind others on a
+            // full bus are no fault of the board: the replies that stay away tell of that (A11).
             let (waiting, overruns, offs) = can.lock(|can| {
                 can.tend();
                 (can.waiting(), can.overruns(), can.bus_offs())
             });
-            late = waiting > 0 || !self.queues.to_bus.is_empty();
+            late = waiting == 0 && !self.queues.to_bus.is_empty();
             (lost, off) = (overruns != self.lost_frames, offs != self.bus_offs);
             (self.lost_frames, self.bus_offs) = (overruns, offs);
         }
