@@ -14,23 +14,9 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum OrientationRows<T> {
     /// Eqs. (4), (6), (7).
-    Quaternion { state: OrientationState<T>, start: Quaternion<T>, goal: Quaternion<T>, filter: GoalFilter<T> },
+    Quaternion { state: OrientationState<T>, start: Quaternion<T>, goal: Quaternion<T>, commanded: Quaternion<T> },
     /// Eq. (1) on rotation vectors.
     Vector { map: LogMap<T>, rows: PointRows<T, 3> },
-}
-
-/// The commanded goal, and the rotation vector from the present goal to it, which the goal filter shortens.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct GoalFilter<T> {
-    commanded: Quaternion<T>,
-    rest: [T; 3],
-}
-
-impl<T: Scalar> GoalFilter<T> {
-    /// Arrived at this goal.
-    const fn at(commanded: Quaternion<T>) -> Self {
-        Self { commanded, rest: [T::ZERO; 3] }
-    }
 }
 
 /// Orientations at the ends of a demonstration, and how they are meant.
@@ -48,7 +34,7 @@ impl<T: Scalar> OrientationRows<T> {
         state: OrientationState { q: Quaternion::IDENTITY, omega: [T::ZERO; 3] },
         start: Quaternion::IDENTITY,
         goal: Quaternion::IDENTITY,
-        filter: GoalFilter::at(Quaternion::IDENTITY),
+        commanded: Quaternion::IDENTITY,
     };
 
     /// # Errors
@@ -72,7 +58,7 @@ impl<T: Scalar> OrientationRows<T> {
             state: OrientationState { q: start, omega: scale(omega, duration) },
             start,
             goal,
-            filter: GoalFilter::at(goal),
+            commanded: goal,
         })
     }
 
@@ -85,7 +71,7 @@ impl<T: Scalar> OrientationRows<T> {
         zeta: &[T; 3],
     ) -> OrientationReference<T> {
         match self {
-            Self::Quaternion { state, start, goal, filter } => {
+            Self::Quaternion { state, start, goal, commanded } => {
                 let input = OrientationInput { start: *start, goal: *goal, s: tick.s, f: *f, zeta: *zeta };
                 let rhs = OrientationSystem::new(*gains).right_hand_side(state, &input);
                 let out = OrientationReference {
@@ -95,9 +81,11 @@ impl<T: Scalar> OrientationRows<T> {
                 };
                 state.step(&rhs, tick.h);
                 if tick.goal_fraction > T::ZERO {
-                    filter.rest = filter.rest.map(|rest| rest - rest * tick.goal_fraction);
-                    let back = Quaternion::from_rotation_vector(&filter.rest.map(|rest| -rest));
-                    *goal = filter.commanded.product(&back).renormalised();
+                    let rest = goal.conjugate().product(commanded).rotation_vector();
+                    let turn = Quaternion::from_rotation_vector(&scale(&rest, tick.goal_fraction));
+                    let next = goal.product(&turn).renormalised();
+                    // What is less than the last digit of the goal would be lost.
+                    *goal = if next == *goal { *commanded } else { next };
                 }
                 out
             }
@@ -120,7 +108,7 @@ impl<T: Scalar> OrientationRows<T> {
         filtered: bool,
     ) -> Result<(), RolloutError> {
         match self {
-            Self::Quaternion { state, goal, filter, .. } => {
+            Self::Quaternion { state, goal, commanded, .. } => {
                 let new = match taught.hemisphere {
                     Hemisphere::Demonstrated => new.aligned_with(&taught.goal),
                     Hemisphere::Nearest => new.aligned_with(&state.q),
@@ -128,15 +116,16 @@ impl<T: Scalar> OrientationRows<T> {
                 if !is_near_enough(&state.q, &new) {
                     return Err(RolloutError::TurnsTooFar);
                 }
-                *filter = GoalFilter::at(new);
-                if filtered {
-                    filter.rest = goal.conjugate().product(&new).rotation_vector();
-                } else {
-                    *goal = new;
+                *commanded = new;
+                if !filtered {
+                    *goal = *commanded;
                 }
             }
             Self::Vector { map, rows } => {
-                rows.set_goal(map.vector(new, &map.goal()), filtered);
+                rows.commanded = map.vector(new, &map.goal());
+                if !filtered {
+                    rows.goal = rows.commanded;
+                }
             }
         }
         Ok(())
@@ -144,11 +133,8 @@ impl<T: Scalar> OrientationRows<T> {
 
     pub(crate) fn arrive(&mut self) {
         match self {
-            Self::Quaternion { goal, filter, .. } => {
-                *goal = filter.commanded;
-                *filter = GoalFilter::at(*goal);
-            }
-            Self::Vector { rows, .. } => rows.arrive(),
+            Self::Quaternion { goal, commanded, .. } => *goal = *commanded,
+            Self::Vector { rows, .. } => rows.goal = rows.commanded,
         }
     }
 
@@ -156,7 +142,7 @@ impl<T: Scalar> OrientationRows<T> {
     pub(crate) fn settle(&mut self) {
         match self {
             // Of the sign that the path has now: it is the near one by itself.
-            Self::Quaternion { state, goal, filter, .. } => (*goal, *filter) = (state.q, GoalFilter::at(state.q)),
+            Self::Quaternion { state, goal, commanded, .. } => (*goal, *commanded) = (state.q, state.q),
             Self::Vector { rows, .. } => rows.settle(),
         }
     }

@@ -9,9 +9,7 @@ pub(crate) struct PointRows<T, const D: usize> {
     pub(crate) state: [PointState<T>; D],
     pub(crate) start: [T; D],
     pub(crate) goal: [T; D],
-    commanded: [T; D],
-    /// The part of the way to the commanded goal that the goal filter has not gone yet.
-    rest: [T; D],
+    pub(crate) commanded: [T; D],
 }
 
 /// Values of one tick that all rows share.
@@ -21,7 +19,7 @@ pub(crate) struct Tick<T> {
     pub(crate) rate: T,
     pub(crate) rate_squared: T,
     pub(crate) rate_slope: T,
-    /// Part of the rest of the way to the commanded goal that the goal filter goes in this tick.
+    /// Part of the way to the commanded goal that the goal filter goes in this tick.
     pub(crate) goal_fraction: T,
 }
 
@@ -32,7 +30,6 @@ impl<T: Scalar, const D: usize> PointRows<T, D> {
             start,
             goal,
             commanded: goal,
-            rest: [T::ZERO; D],
         }
     }
 
@@ -55,11 +52,8 @@ impl<T: Scalar, const D: usize> PointRows<T, D> {
             state.step(rhs, tick.h);
         }
         if tick.goal_fraction > T::ZERO {
-            // By the rest and not by the goal: what a tick adds to that is soon less than the last digit of an f32, and
-            // it would stop on the way.
-            for ((goal, commanded), rest) in self.goal.iter_mut().zip(&self.commanded).zip(&mut self.rest) {
-                *rest = *rest - *rest * tick.goal_fraction;
-                *goal = *commanded - *rest;
+            for (goal, commanded) in self.goal.iter_mut().zip(&self.commanded) {
+                *goal = towards(*goal, *commanded, tick.goal_fraction);
             }
         }
         out
@@ -72,28 +66,23 @@ impl<T: Scalar, const D: usize> PointRows<T, D> {
         if bounds::first_beyond(&goal, T::from_f64(bounds::LARGEST_VALUE)).is_some() {
             return Err(RolloutError::TooLarge);
         }
-        self.set_goal(goal, filtered);
-        Ok(())
-    }
-
-    /// A checked goal, at once or through the filter.
-    pub(crate) fn set_goal(&mut self, goal: [T; D], filtered: bool) {
         self.commanded = goal;
-        if filtered {
-            self.rest = core::array::from_fn(|i| goal[i] - self.goal[i]);
-        } else {
-            self.arrive();
+        if !filtered {
+            self.goal = goal;
         }
-    }
-
-    /// The commanded goal acts at once.
-    pub(crate) fn arrive(&mut self) {
-        self.goal = self.commanded;
-        self.rest = [T::ZERO; D];
+        Ok(())
     }
 
     /// The present values become the goal.
     pub(crate) fn settle(&mut self) {
-        self.set_goal(self.state.map(|state| state.x()), false);
+        self.goal = self.state.map(|state| state.x());
+        self.commanded = self.goal;
     }
+}
+
+/// The goal after a tick of the filter. What is less than its last digit would be lost, in f32 a part of the way that a
+/// slow movement has left: that part is gone at once.
+fn towards<T: Scalar>(goal: T, commanded: T, fraction: T) -> T {
+    let next = goal + (commanded - goal) * fraction;
+    if next == goal { commanded } else { next }
 }

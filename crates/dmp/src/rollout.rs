@@ -270,10 +270,10 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
             }
         } else {
             for rows in &mut self.poses {
-                rows.position.arrive();
+                rows.position.goal = rows.position.commanded;
                 rows.orientation.arrive();
             }
-            self.points.arrive();
+            self.points.goal = self.points.commanded;
         }
         self.goal_filter = rate;
         self.goal_fraction = (T::ZERO, T::ZERO);
