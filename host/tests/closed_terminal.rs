@@ -1,4 +1,5 @@
-//! A terminal that is closed ends what was shown in it.
+//! What a terminal does to the programs that were started in it: closed, it ends what it showed; its Ctrl-C reaches
+//! those that know how to stop an arm.
 
 #![cfg(target_os = "linux")]
 
@@ -45,6 +46,31 @@ fn ends_with_its_terminal(folder: &Path) -> bool {
         let _ = Command::new("kill").args(["-9", process.trim()]).status();
     }
     has_ended
+}
+
+/// QEMU ended with the first Ctrl-C, before the arm in it had been stopped: `tactus run` ended with E102.
+#[test]
+fn ctrl_c_does_not_reach_the_emulator_of_a_simulated_arm() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::create_dir(at.join("bin")).unwrap();
+    // Tells its group and that of the program which started it; what a terminal sends goes to a group.
+    let emulator = at.join("bin/qemu-system-arm");
+    let group = |process: &str| format!("awk '{{ print $5 }}' /proc/{process}/stat");
+    let script = format!("#!/bin/sh\n{} > emulator\n{} > tool\n", group("$$"), group("$PPID"));
+    std::fs::write(&emulator, script).unwrap();
+    std::fs::set_permissions(&emulator, std::fs::Permissions::from_mode(0o755)).unwrap();
+    std::fs::write(at.join("arm.elf"), "").unwrap();
+    let path = format!("{}:{}", at.join("bin").display(), std::env::var("PATH").unwrap());
+    let mut tactus = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    tactus.current_dir(at).env("PATH", path).env("TACTUS_IMAGE", at.join("arm.elf")).env("XDG_CONFIG_HOME", at);
+    tactus.args(["--device", "sim:world=simple", "list"]).stdin(Stdio::null());
+    let said = String::from_utf8_lossy(&tactus.output().unwrap().stderr).into_owned();
+    let told = |name: &str| std::fs::read_to_string(at.join(name)).unwrap_or_else(|_| panic!("no emulator: {said}"));
+    let (emulator, tool) = (told("emulator"), told("tool"));
+    assert!(emulator.trim().parse::<u32>().is_ok() && tool.trim().parse::<u32>().is_ok(), "{emulator}{tool}");
+    assert_ne!(emulator, tool, "they get the same signals");
 }
 
 #[test]
