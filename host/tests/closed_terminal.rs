@@ -1,5 +1,5 @@
-//! What a terminal does to the programs that were started in it: closed, it ends what it showed; its Ctrl-C reaches
-//! those that know how to stop an arm.
+//! Terminals and the programs that were started in them: a closed one ends what it showed, and its Ctrl-C reaches those
+//! that know how to stop an arm.
 
 #![cfg(target_os = "linux")]
 

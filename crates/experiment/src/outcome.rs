@@ -109,7 +109,7 @@ impl fmt::Display for Outcome {
 }
 
 /// Forces and motion of the object, and between hand, object and table. Times are seconds after the primitive started.
-/// What ends with the closing of the fingers ends with the lift where they never close.
+/// Measures until the fingers close are measures until the lift where they never close.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Measures {
     /// Height of the object above where it stood, at the end, m.
@@ -171,6 +171,16 @@ impl Measures {
             }),
             ..Measures::default()
         }
+    }
+
+    /// The time at which the fingers began to close; the lift where they never did, s.
+    pub fn closed(&self) -> f64 {
+        self.closing_s.unwrap_or(self.lift_s)
+    }
+
+    /// The time until which the hand touches nothing and holds nothing, s.
+    pub fn free_until(&self) -> f64 {
+        self.touch_s.map_or(self.closed(), |touch| touch.min(self.closed()))
     }
 
     /// Largest force of the finger that presses hardest, 50 ms average, N.

@@ -149,7 +149,7 @@ fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, durat
     }
 }
 
-/// What comes from the keyboard. It is read beside the watching: where a terminal was closed the library that reads it
+/// Input of the keyboard. It is read beside the watching: where a terminal was closed the library that reads it
 /// may never return, and nobody would see any more that the command is to end.
 fn keys() -> Receiver<std::io::Result<Input>> {
     let (sender, keys) = mpsc::channel();

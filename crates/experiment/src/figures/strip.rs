@@ -31,7 +31,7 @@ fn frames(trial: &Trial) -> Vec<Scene> {
     let m = &trial.report.measures;
     let run = trial.marks.run;
     // Fingers that never close are shown as those that close with the lift.
-    let closing = m.closing_s.unwrap_or(m.lift_s);
+    let closing = m.closed();
     let touch = m.touch_s.unwrap_or(0.6 * closing).min(closing);
     let end = trial.snapshots.last().map_or(run, |snapshot| snapshot.time);
     let times: [f64; FRAMES] = [run, run + touch, run + 0.5 * (touch + closing), run + m.lift_s, end];
