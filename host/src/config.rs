@@ -16,6 +16,9 @@ use serde::{Deserialize, Serialize};
 /// The variable of `--timeout`.
 pub const TIMEOUT_VARIABLE: &str = "TACTUS_TIMEOUT";
 
+/// The variable that names a device.
+pub const DEVICE_VARIABLE: &str = "TACTUS_DEVICE";
+
 /// Content of the file.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -101,7 +104,8 @@ impl Config {
         table.get("device")?.as_str().map(str::to_owned)
     }
 
-    /// The command line with these defaults. An empty variable of the environment counts as none.
+    /// The command line with these defaults. An empty variable of the environment counts as none. A device that is no
+    /// Unicode is named as well as can be: clap would refuse every command, and name neither variable nor remedy.
     #[must_use]
     pub fn defaults(&self, mut command: Command) -> Command {
         for option in ["device", "timeout", "secret_file"] {
@@ -111,7 +115,15 @@ impl Config {
             });
         }
         let timeout = self.timeout.map(|timeout| timeout.to_string());
-        let values = [("device", self.device.clone()), ("timeout", timeout), ("secret_file", self.secret_file.clone())];
+        let unreadable = unreadable_device();
+        if unreadable.is_some() {
+            command = command.mut_arg("device", |argument| argument.env(Resettable::Reset));
+        }
+        let values = [
+            ("device", unreadable.or_else(|| self.device.clone())),
+            ("timeout", timeout),
+            ("secret_file", self.secret_file.clone()),
+        ];
         for (option, value) in values {
             if let Some(value) = value {
                 // Read once a process, and clap keeps it as long as that lives.
@@ -131,6 +143,7 @@ impl Config {
         let origin = |option: &str, is_in_file: bool| match deepest.value_source(option) {
             Some(ValueSource::CommandLine) => Origin::CommandLine,
             Some(ValueSource::EnvVariable) => Origin::Environment,
+            Some(_) if option == "device" && unreadable_device().is_some() => Origin::Environment,
             Some(_) if is_in_file => Origin::File,
             _ => Origin::Default,
         };
@@ -138,6 +151,12 @@ impl Config {
         let timeout = origin("timeout", self.timeout.is_some());
         Origins { file, problem: None, device, timeout, secret_file: origin("secret_file", self.secret_file.is_some()) }
     }
+}
+
+/// The device that the environment names, if its name is no Unicode; what cannot be read in it is replaced.
+fn unreadable_device() -> Option<String> {
+    let value = std::env::var_os(DEVICE_VARIABLE)?;
+    value.to_str().is_none().then(|| value.to_string_lossy().into_owned())
 }
 
 /// The variable with a time-out, if its value is none: what is wrong with it, and the command line without it.

@@ -354,6 +354,23 @@ fn a_place_where_no_arm_can_be_served_is_told_with_those_where_one_can() {
     }
 }
 
+/// Nobody stands beside the arm of the simple world, a served or a real one: a person was asked to guide it.
+#[test]
+fn options_of_the_simulated_teacher_are_refused_where_there_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for option in ["--movement cup", "--teacher 5"] {
+        let (exit, code, message, help) = refused(at, &format!("{DEVICE} teach --duration 1 -o a.csv {option}"));
+        assert!(
+            exit == 2 && code == "E200" && message.contains(option.split(' ').next().unwrap()),
+            "{code}: {message}"
+        );
+        assert!(help.contains("sil:"), "{help}");
+        assert!(!at.join("a.csv").exists() && !at.join("a.csv.part").exists());
+    }
+    succeeds(at, &format!("{DEVICE} teach --duration 1 -o a.csv"));
+}
+
 /// A newcomer leaves out the ending, or expects that a simulated device remembers the last command.
 #[test]
 fn a_primitive_that_is_not_there_is_named_with_the_place_where_it_may_be() {

@@ -62,6 +62,32 @@ fn an_empty_variable_counts_as_none_and_the_file_counts() {
     assert_eq!(shown["settings"]["secret_file"]["origin"], "default");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_device_in_the_environment_that_is_no_text_is_told_and_counts_for_nobody_who_names_another() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let folder = tempfile::tempdir().unwrap();
+    // What the file names is not taken instead: somebody meant another arm.
+    configure(folder.path(), "device = \"sil:world=simple\"\n");
+    let ask = |line: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
+        command.current_dir(folder.path()).env("XDG_CONFIG_HOME", folder.path());
+        command.env("TACTUS_DEVICE", std::ffi::OsStr::from_bytes(b"unix:/tmp/\xff.sock"));
+        command.args(line.split_whitespace()).stdin(Stdio::null()).output().unwrap()
+    };
+    for line in ["list", "stop", "--json status"] {
+        let output = ask(line);
+        assert_eq!(output.status.code(), Some(2), "{line}: {}", said(&output));
+        let words = said(&output);
+        assert!(words.contains("E201") && words.contains("no text") && words.contains("TACTUS_DEVICE"), "{words}");
+    }
+    for line in ["--device sil:world=simple list", "explain E504", "completions bash", "--help"] {
+        assert_eq!(ask(line).status.code(), Some(0), "{line}: {}", said(&ask(line)));
+    }
+    let shown: Value = serde_json::from_slice(&ask("--json config").stdout).unwrap();
+    assert_eq!(shown["settings"]["device"]["origin"], "environment", "{shown}");
+}
+
 #[test]
 fn a_stop_takes_the_device_from_a_file_in_which_something_else_is_wrong() {
     for wrong in ["timeout = -1", "timeout = \"soon\"", "tiemout = 3", "secret_file = 7"] {

@@ -157,4 +157,16 @@ fn a_socket_at_which_nobody_serves_is_no_cable() {
         let help = format!("`tactus sim --listen unix:{socket}`");
         assert!(said(&refused).contains(&help) && !said(&refused).contains("cable"), "{}", said(&refused));
     }
+    // Where no arm can be served either, nobody is told to serve one there.
+    std::fs::write(folder.join("a.csv"), "").unwrap();
+    for (address, words) in [
+        ("unix:a.csv", "a.csv is no socket"),
+        ("unix:.", ". is no socket"),
+        ("unix:none/a.sock", "there is no folder none"),
+        ("tcp:nobody.invalid:3333", "check the name of the computer"),
+    ] {
+        let refused = tactus(folder, &format!("--device {address} list"));
+        assert_eq!(refused.status.code(), Some(3), "{address}: {}", said(&refused));
+        assert!(said(&refused).contains(words) && !said(&refused).contains("tactus sim"), "{}", said(&refused));
+    }
 }

@@ -54,6 +54,21 @@ fn the_guide_names_every_thing_a_person_must_do_at_the_pendant_in_the_words_of_t
     }
 }
 
+#[test]
+fn the_guide_shows_the_link_and_the_words_of_today() {
+    use lab::error::HostError;
+    let shown = |name: &str| {
+        let line = GUIDE.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("no line of {name}"));
+        line.trim_start_matches(name).trim().to_owned()
+    };
+    assert_eq!(shown("link version"), link::LINK_VERSION.to_string());
+    assert_eq!(shown("schema"), format!("0x{:08x}", link::SCHEMA_HASH));
+    assert_eq!(shown("robot model"), format!("0x{:08x}", control::MODEL_HASH));
+    let owner = link::SessionOwner { name: link::Text::new("anna@lab3 (process 4711)"), since_ms: 12_000 };
+    let failure = HostError::InUse { owner: Some(owner), wait_ms: 440 }.into_failure("delete").to_string();
+    assert!(GUIDE.contains(&failure), "{failure}");
+}
+
 /// Options of the tool and of all its commands, each with the values that it takes; none: any.
 fn options(command: &clap::Command) -> Vec<(String, Vec<String>)> {
     let values =

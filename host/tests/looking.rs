@@ -44,6 +44,10 @@ fn a_report_is_written_once_and_replaced_only_when_told_to() {
     assert_eq!(std::fs::read_to_string(folder.join("page.html")).unwrap(), page, "the same input, the same page");
 
     assert!(stderr(&tactus(folder, &["report", "reach.toml", "-o", "other.html"]).code(6)).contains("E610"));
+    // Joint angles alone do not tell how a run ended, nor that there was one.
+    let demonstration = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/examples/reach.csv");
+    let refused = stderr(&tactus(folder, &["report", demonstration, "-o", "other.html"]).code(6));
+    assert!(refused.contains("missing columns state, phase") && refused.contains("tactus run --record"), "{refused}");
     assert!(!folder.join("other.html").exists());
 }
 
@@ -57,7 +61,9 @@ fn cli_2_codes_and_faults_are_explained_without_a_device() {
     assert_eq!(explained("504"), explained("e504"));
     assert!(explained("E702").contains("usual cause: no power"));
     assert!(explained("contactforce").starts_with("ContactForce: the contact force"));
-    for unknown in ["E999", "None", "", "E", "99999999"] {
+    // A recording has the number of a fault.
+    assert_eq!(explained("9"), explained("ContactForce"));
+    for unknown in ["E999", "None", "0", "99", "", "E", "99999999"] {
         assert!(stderr(&tactus(folder.path(), &["explain", unknown]).code(2)).contains("E241"), "{unknown}");
     }
 }

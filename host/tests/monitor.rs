@@ -29,7 +29,7 @@ fn contact() -> Watch {
     let telemetry = Telemetry {
         cycle: 45_123,
         state: State::Run.code(),
-        flags: flags::FEEDBACK | flags::CLAMPED,
+        flags: flags::POSITIONS_KNOWN | flags::TARED | flags::FEEDBACK | flags::CLAMPED,
         phase: 0.2,
         q: [-0.87, 0.62, 0.1, 1.92, -0.2, -0.61, 2.9],
         dq: [0.12, -0.3, 0.0, 0.45, 0.0, -0.1, 0.02],
@@ -92,6 +92,28 @@ fn cli_9_screens_are_as_they_were_looked_at() {
     is_golden("contact.txt", &contact(), (80, 24));
     is_golden("fault.txt", &fault(), (80, 24));
     is_golden("wide.txt", &fault(), (110, 30));
+}
+
+#[test]
+fn the_screen_shows_no_number_that_nobody_has_measured() {
+    // A cycle of the start-up carries zeros for what is not known yet.
+    let mut starting = watch();
+    starting.cycle(Telemetry { cycle: 7, ..Telemetry::default() });
+    let shown = screen(&starting, 80, 24);
+    assert!(shown.contains("J7  not zeroed") && !shown.contains("rad/s"), "{shown}");
+    assert!(shown.contains("not known before the joint angles") && !shown.contains("fx"), "{shown}");
+    // An arm that was zeroed before the monitor came has angles, and neither speed nor torque.
+    let mut zeroed = watch();
+    zeroed.status = Status { zeroed: true, q: [0.5; 7], ..zeroed.status };
+    let shown = screen(&zeroed, 80, 24);
+    assert!(shown.contains("J7  +0.500 rad") && !shown.contains("0.00 rad/s") && !shown.contains("0.0 N m"), "{shown}");
+    // One that starts anew does not know any more where it stands.
+    zeroed.cycle(Telemetry { cycle: 8, ..Telemetry::default() });
+    assert!(screen(&zeroed, 80, 24).contains("J7  not read yet"), "{}", screen(&zeroed, 80, 24));
+    // An arm without a sensor knows its angles and no force.
+    starting.cycle(Telemetry { flags: flags::POSITIONS_KNOWN | flags::WRENCH_STALE, ..Telemetry::default() });
+    let shown = screen(&starting, 80, 24);
+    assert!(shown.contains("J7  +0.000 rad") && shown.contains("no force sensor answers"), "{shown}");
 }
 
 #[test]

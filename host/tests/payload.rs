@@ -154,7 +154,15 @@ fn the_verdict_goes_by_what_is_declared_and_by_the_weight_in_use() {
 fn what_cannot_be_asked_for_or_subtracted_is_refused_before_the_arm_moves() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let lines: [&[&str]; 3] = [&["hand", "--measure"], &["--without", "empty.json"], &["--report", "report.json"]];
+    // Nothing is measured where something is declared: a report would not be written, and nobody would know.
+    let lines: [&[&str]; 6] = [
+        &["hand", "--measure"],
+        &["--without", "empty.json"],
+        &["--report", "report.json"],
+        &["hand", "--report", "report.json"],
+        &["hand", "--without", "empty.json"],
+        &["hand", "--at-home"],
+    ];
     for line in lines {
         let output = tactus(folder, ARM, &[&["calibrate", "payload"], line].concat());
         assert_eq!(output.status.code(), Some(2), "{line:?}");

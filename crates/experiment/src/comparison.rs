@@ -149,7 +149,7 @@ fn meets(open: &Report, scenario: Scenario) -> bool {
     let measures = &open.measures;
     match scenario {
         Scenario::Bottle => measures.table_peak_n > 0.0,
-        _ => measures.touch_s.is_some_and(|touch| touch < measures.closing_s),
+        _ => measures.touch_s.is_some_and(|touch| measures.closing_s.is_none_or(|closing| touch < closing)),
     }
 }
 

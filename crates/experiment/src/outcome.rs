@@ -109,6 +109,7 @@ impl fmt::Display for Outcome {
 }
 
 /// Forces and motion of the object, and between hand, object and table. Times are seconds after the primitive started.
+/// Measures until the fingers close are measures until the lift where they never close.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Measures {
     /// Height of the object above where it stood, at the end, m.
@@ -119,8 +120,8 @@ pub struct Measures {
     pub push_m: f64,
     /// First touch of the object.
     pub touch_s: Option<f64>,
-    /// The fingers began to close.
-    pub closing_s: f64,
+    /// The fingers began to close; `None` where they never did.
+    pub closing_s: Option<f64>,
     /// The arm began to lift.
     pub lift_s: f64,
     /// When the failure began in the world: the object leaned over 10 degrees and went on to fall, was pushed 3 cm,
@@ -172,6 +173,16 @@ impl Measures {
         }
     }
 
+    /// The time at which the fingers began to close; the lift where they never did, s.
+    pub fn closed(&self) -> f64 {
+        self.closing_s.unwrap_or(self.lift_s)
+    }
+
+    /// The time until which the hand touches nothing and holds nothing, s.
+    pub fn free_until(&self) -> f64 {
+        self.touch_s.map_or(self.closed(), |touch| touch.min(self.closed()))
+    }
+
     /// Largest force of the finger that presses hardest, 50 ms average, N.
     pub fn hardest_finger(&self) -> f64 {
         self.finger_grip_n.into_iter().fold(0.0, f64::max)
@@ -215,8 +226,8 @@ pub fn judge(
     let closing = run
         .iter()
         .find(|sample| (1..4).any(|finger| sample.digits[finger] - first.digits[finger] > CLOSING))
-        .map_or(marks.lift, |sample| sample.time);
-    let before = observation.between(marks.run, closing);
+        .map(|sample| sample.time);
+    let before = observation.between(marks.run, closing.unwrap_or(marks.lift));
     let lifted = observation.between(marks.lift, f64::INFINITY);
     let height = |sample: &Sample| sample.object[2] - first.object[2];
     let moved = |sample: &Sample| (sample.object[0] - first.object[0]).hypot(sample.object[1] - first.object[1]);
@@ -254,7 +265,7 @@ pub fn judge(
         }
         Outcome::PushedAway => first_time(&|sample| moved(sample) > PUSHED),
         Outcome::Missed => first_time(&|sample| sample.digits[1..].iter().any(|inner| *inner > SHOULD_HOLD))
-            .or(Some(closing - marks.run)),
+            .or(closing.map(|time| time - marks.run)),
         Outcome::Dropped => {
             lifted.iter().rfind(|sample| sample.contact.touches()).map(|sample| sample.time - marks.run)
         }
@@ -266,7 +277,7 @@ pub fn judge(
         tilt_deg: tilt.to_degrees(),
         push_m: before.last().map_or(0.0, moved),
         touch_s: first_time(&|sample| sample.contact.touches()),
-        closing_s: closing - marks.run,
+        closing_s: closing.map(|time| time - marks.run),
         lift_s: marks.lift - marks.run,
         failure_s,
         contact_peak_n: forces.iter().copied().fold(0.0, f64::max),
@@ -355,8 +366,20 @@ mod tests {
         );
         assert!((measures.touch_s.unwrap() - 5.0).abs() < 0.011, "{:?}", measures.touch_s);
         // The fingers have moved 0.05 rad a tenth of a second after they began.
-        assert!((measures.closing_s - 8.1).abs() < 0.02, "{}", measures.closing_s);
+        assert!((measures.closing_s.unwrap() - 8.1).abs() < 0.02, "{:?}", measures.closing_s);
         assert_eq!((measures.failure_s, measures.lift_s), (None, 12.0));
+    }
+
+    #[test]
+    fn fingers_that_never_closed_have_no_time_at_which_they_did() {
+        let mut observation = good();
+        observation.samples.iter_mut().for_each(|sample| {
+            (sample.digits, sample.object[2]) = ([0.0, 0.25, 0.25, 0.25], 0.0);
+        });
+        let (outcome, measures) = judge(&observation, &MILESTONES, UPRIGHT, ArmConduct::default());
+        assert_eq!((outcome, measures.closing_s, measures.failure_s), (Outcome::Missed, None, None));
+        // What is measured before they close is measured until the lift.
+        assert_eq!(measures.contact_peak_n, 3.0);
     }
 
     #[test]

@@ -362,7 +362,7 @@ const COLUMNS: [Column; 39] = [
     ("free_sag_m", |r| optional(r.free_sag_m)),
     ("shaking_rad_s", |r| number(r.measures.shaking_rad_s)),
     ("touch_s", |r| optional(r.measures.touch_s)),
-    ("closing_s", |r| number(r.measures.closing_s)),
+    ("closing_s", |r| optional(r.measures.closing_s)),
     ("lift_s", |r| number(r.measures.lift_s)),
     ("failure_s", |r| optional(r.measures.failure_s)),
     ("surprise_s", |r| optional(r.surprise.map(|surprise| surprise.time_s))),

@@ -194,7 +194,7 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
     let (observation, snapshots) = take_observation(&mut client);
     let conduct = ArmConduct { fault: fault.as_deref(), shaking: shaking::amplitude(&telemetry) };
     let (outcome, mut measures) = outcome::judge(&observation, &marks, config.rule(), conduct);
-    (measures.finger_asked_n, measures.chatter_n) = (asked(config), trace.chatter(measures.closing_s, measures.lift_s));
+    (measures.finger_asked_n, measures.chatter_n) = (asked(config), trace.chatter(measures.closed(), measures.lift_s));
     let movement = (config.primitive.movement.duration / config.variation.speed).min(measures.lift_s);
     let (adaptation_m, adaptation_deg) = trace.adaptation(&prepared.taught, config.variation.speed, movement);
     let report = Report {
@@ -212,7 +212,7 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
             (None, true) => trace.sag(arrived - run - SETTLED_SECONDS, arrived - run),
             (None, false) => trace.sag(end - run - SETTLED_SECONDS, end - run),
         },
-        free_sag_m: trace.free_sag(measures.touch_s.map_or(measures.closing_s, |touch| touch.min(measures.closing_s))),
+        free_sag_m: trace.free_sag(measures.free_until()),
         surprise: surprises.first().map(|surprise| Surprise {
             phase: surprise.phase,
             channel: CHANNELS.iter().position(|name| *name == surprise.channel).map_or(u8::MAX, |index| index as u8),

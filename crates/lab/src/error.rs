@@ -126,7 +126,7 @@ pub enum HostError {
     #[error("interrupted; the arm has stopped")]
     Interrupted,
     /// The user interrupted a program that had set nothing in motion, or whose motion had ended.
-    #[error("interrupted; this command moves nothing, so nothing was stopped: `tactus stop` stops the arm")]
+    #[error("interrupted; nothing that this command began moves, so nothing was stopped: `tactus stop` stops the arm")]
     Left,
 }
 

@@ -269,6 +269,12 @@ fn notes_and_blank_lines_do_not_shift_line_numbers() {
     names(&parse(&lines.join("\n")).unwrap_err(), 42, column("q1_rad") + 1);
     // Line ends of another system.
     names(&parse(&lines.join("\r\n")).unwrap_err(), 42, column("q1_rad") + 1);
+    // An editor leaves spaces in a line that looks empty.
+    lines[20] = "  ".to_owned();
+    lines.push("   \n".to_owned());
+    names(&parse(&lines.join("\n")).unwrap_err(), 42, column("q1_rad") + 1);
+    lines[41] = good()[39].clone();
+    assert_eq!(parse(&lines.join("\n")).unwrap().len(), parse(&good().join("\n")).unwrap().len());
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! From the options of the command line to a conversation with a device.
 
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -19,7 +20,7 @@ use lab::procedure::{self, ProcedureError, Readiness, StartupLook};
 use lab::secret_file::{self, SecretFileError};
 use lab::simulation::{SimulationError, SimulationOptions};
 use lab::startup_guide::{blocked_remedy, stage_remedy};
-use lab::transport::Address;
+use lab::transport::{Address, TransportError};
 
 /// Two signals within this time are one.
 const SAME_SIGNAL: Duration = Duration::from_millis(500);
@@ -151,18 +152,56 @@ fn reach(
     };
     let device = Device::open(&address, adjust).map_err(|error| match error {
         OpenError::Transport(error) => {
+            let help = socket_help(&address, &error);
             let failure = HostError::Transport(error).into_failure(doing);
-            match (failure.code, &address) {
-                (ErrorCode::DeviceNotFound, Address::Unix(_) | Address::Tcp(_)) => failure.help(format!(
-                    "nobody serves there: `tactus sim --listen {address}` serves a simulated arm, in a terminal of its \
-                     own"
-                )),
-                _ => failure,
+            match help {
+                Some(help) => failure.help(help),
+                None => failure,
             }
         }
         OpenError::Simulation(error) => simulation_failure(error, doing),
     })?;
     Ok((device, owner(matches!(address, Address::Simulated(..)))))
+}
+
+/// The help of a socket that cannot be opened; what only a serial line needs helps nobody there.
+fn socket_help(address: &Address, error: &TransportError) -> Option<String> {
+    let nobody = || {
+        format!("nobody serves there: `tactus sim --listen {address}` serves a simulated arm, in a terminal of its own")
+    };
+    match (address, error) {
+        (Address::Unix(path), TransportError::Permission { .. }) => {
+            Some(format!("check the rights of the socket with `ls -l {}`", path.display()))
+        }
+        // A socket whose program was killed is still there, and the next one takes its place.
+        (Address::Unix(path), TransportError::NotFound { .. }) => {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            Some(match (std::fs::metadata(path), folder.is_dir()) {
+                (Ok(found), _) if !is_socket(&found) => {
+                    format!("{} is no socket: correct the name, or have another one served", path.display())
+                }
+                (Err(_), false) => format!("there is no folder {}: correct the name", folder.display()),
+                _ => nobody(),
+            })
+        }
+        (Address::Tcp(_), TransportError::NotFound { cause, .. }) => Some(match cause.kind() {
+            ErrorKind::ConnectionRefused => nobody(),
+            _ => "check the name of the computer, and that it can be reached from here".to_owned(),
+        }),
+        _ => None,
+    }
+}
+
+#[cfg(unix)]
+fn is_socket(found: &std::fs::Metadata) -> bool {
+    use std::os::unix::fs::FileTypeExt as _;
+    found.file_type().is_socket()
+}
+
+/// Unix sockets do not exist on this system.
+#[cfg(not(unix))]
+fn is_socket(_: &std::fs::Metadata) -> bool {
+    false
 }
 
 /// Makes the arm ready, its hand too, and says what happens and what a person must do.

@@ -12,7 +12,8 @@ use super::{ErrorCode, Failure, Global};
 /// Options of `explain`.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
-    /// The code of an error, `E504` or 504, or the name of a fault, for example `ContactForce`
+    /// The code of an error, `E504` or 504, or the name of a fault, for example `ContactForce`, or its number, as in
+    /// recordings
     #[arg(value_name = "CODE")]
     pub code: String,
 }
@@ -24,7 +25,9 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let text = command.code.as_str();
     let mut faults = Fault::ALL.into_iter().filter(|fault| *fault != Fault::None);
-    let fault = faults.find(|fault| format!("{fault:?}").eq_ignore_ascii_case(text));
+    let fault = faults.find(|fault| {
+        format!("{fault:?}").eq_ignore_ascii_case(text) || text.parse().is_ok_and(|number: u8| number == fault.code())
+    });
     let (code, meaning, reaction, cause, check, remedy) = match (error(text), fault) {
         (Some(code), _) => (code.to_string(), code.meaning(), "", code.cause(), "", code.remedy()),
         (None, Some(fault)) => {
@@ -32,7 +35,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             (format!("{fault:?}"), fault.explanation(), reaction, cause, check, clear)
         }
         (None, None) => {
-            let cause = format!("'{text}' is neither the code of an error nor the name of a fault");
+            let cause = format!("'{text}' is neither the code of an error nor the name or number of a fault");
             return Err(Failure::new(ErrorCode::UnknownCode, "explain", cause));
         }
     };

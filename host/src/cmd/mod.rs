@@ -67,7 +67,7 @@ use lab::failure::Failure;
 use lab::table::Table;
 use lab::transport::Address;
 
-use crate::config::{self as configuration, Config, Origin, Origins, TIMEOUT_VARIABLE, seconds};
+use crate::config::{self as configuration, Config, DEVICE_VARIABLE, Origin, Origins, TIMEOUT_VARIABLE, seconds};
 
 /// Teach, learn, check, upload, run and watch movement primitives on a Barrett WAM.
 ///
@@ -111,7 +111,7 @@ pub struct Global {
     #[arg(long, short = 'V', global = true, action = ArgAction::Version)]
     pub version: Option<bool>,
     /// The device, such as `sil:` or `serial:PATH`; `tactus --help` lists them.
-    #[arg(long, global = true, env = "TACTUS_DEVICE", value_name = "DEVICE")]
+    #[arg(long, global = true, env = DEVICE_VARIABLE, value_name = "DEVICE")]
     pub device: Option<String>,
     /// Longest wait for an answer of the device, s.
     #[arg(long, global = true, env = TIMEOUT_VARIABLE, default_value = "2", value_parser = seconds, value_name = "SECONDS")]

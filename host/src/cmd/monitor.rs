@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
+use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 
 use clap::Args;
@@ -57,10 +58,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut view = if global.json {
         View::Lines(global.output())
     } else {
-        View::Screen(ratatui::try_init().map_err(|cause| Failure::new(ErrorCode::NoTerminal, DOING, cause))?)
+        let terminal = ratatui::try_init().map_err(|cause| Failure::new(ErrorCode::NoTerminal, DOING, cause))?;
+        View::Screen(terminal, keys())
     };
     let watched = follow(&mut client, &mut watch, &mut view, command.duration);
-    if let View::Screen(_) = view {
+    if let View::Screen(..) = view {
         ratatui::restore();
     }
     match watched {
@@ -84,7 +86,7 @@ impl From<HostError> for Ended {
 
 /// Where it is shown.
 enum View {
-    Screen(DefaultTerminal),
+    Screen(DefaultTerminal, Receiver<std::io::Result<Input>>),
     Lines(Output),
 }
 
@@ -132,13 +134,13 @@ fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, durat
             None => {}
         }
         watch.gaps = client.gaps();
-        if let View::Screen(terminal) = view
+        if let View::Screen(terminal, keys) = view
             && drawn.is_none_or(|drawn| client.now().saturating_sub(drawn) >= LOOK_EVERY)
         {
             let broken = |cause| Ended::View(Failure::new(ErrorCode::NoTerminal, "monitor", cause));
             terminal.draw(|frame| draw(frame, watch)).map_err(broken)?;
             drawn = Some(client.now());
-            match wish().map_err(broken)? {
+            match wish(keys).map_err(broken)? {
                 Some(Wish::Stop) => client.order_stop()?,
                 Some(Wish::Leave) => return Ok(()),
                 None => {}
@@ -147,11 +149,27 @@ fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, durat
     }
 }
 
+/// Input of the keyboard. It is read beside the watching: where a terminal was closed the library that reads it
+/// may never return, and nobody would see any more that the command is to end.
+fn keys() -> Receiver<std::io::Result<Input>> {
+    let (sender, keys) = mpsc::channel();
+    std::thread::spawn(move || {
+        loop {
+            let input = event::read();
+            let is_broken = input.is_err();
+            if sender.send(input).is_err() || is_broken {
+                return;
+            }
+        }
+    });
+    keys
+}
+
 /// The key that was pressed since the last look. A stop counts more than all else.
-fn wish() -> std::io::Result<Option<Wish>> {
+fn wish(keys: &Receiver<std::io::Result<Input>>) -> std::io::Result<Option<Wish>> {
     let mut wish = None;
-    while event::poll(Duration::ZERO)? {
-        let Input::Key(key) = event::read()? else { continue };
+    for input in keys.try_iter() {
+        let Input::Key(key) = input? else { continue };
         if key.kind != KeyEventKind::Press || wish == Some(Wish::Stop) {
             continue;
         }

@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, files, plot};
+use lab::demonstration::RecordingError;
 use lab::report::{ReportedRun, page};
 
 /// Options of `report`.
@@ -35,10 +36,13 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "report";
     let inputs: Vec<&Path> = command.runs.iter().chain(&command.primitive).map(PathBuf::as_path).collect();
     let output_file = files::create(&command.output, global, &inputs, "report refused")?;
-    let invalid =
-        |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::PlotInput, DOING, cause);
+    let invalid = |cause: RecordingError| match cause {
+        RecordingError::MissingColumns { .. } => Failure::new(ErrorCode::PlotInput, DOING, cause)
+            .help("give a recording of `tactus run --record`; `tactus plot` draws others"),
+        _ => Failure::of_file(ErrorCode::PlotInput, DOING, cause),
+    };
     let primitive = command.primitive.as_deref().map(|path| super::check::read(path, DOING)).transpose()?;
-    let read = |file: &PathBuf| ReportedRun::read(file, primitive.as_ref()).map_err(|cause| invalid(cause.into()));
+    let read = |file: &PathBuf| ReportedRun::read(file, primitive.as_ref()).map_err(invalid);
     let runs = command.runs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
     if let Some(file) = &primitive {
         runs.iter().try_for_each(|run| plot::same_movement(file, &run.running, "report refused"))?;

@@ -38,12 +38,12 @@ pub struct Cmd {
     /// I have brought the arm to its home pose: zero it there if need be
     #[arg(long)]
     pub at_home: bool,
-    /// Seed of the simulated teacher's hand
-    #[arg(long, default_value_t = DEFAULT_SEED)]
-    pub teacher: u64,
-    /// Movement that the simulated teacher shows
-    #[arg(long, value_enum, default_value_t)]
-    pub movement: MovementName,
+    /// Seed of the simulated teacher's hand [default: 1]
+    #[arg(long)]
+    pub teacher: Option<u64>,
+    /// Movement that the simulated teacher shows [default: demonstration]
+    #[arg(long, value_enum)]
+    pub movement: Option<MovementName>,
 }
 
 /// The movements that the simulated teacher can show.
@@ -86,18 +86,20 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let mut file = RecordingFile::create(&command.output, global, &[], DOING)?;
     let started = Instant::now();
+    let movement = command.movement.unwrap_or_default();
     let mut client = connection::open(global, DOING, |options| {
-        options.teacher = Some(command.teacher);
-        options.movement = command.movement.movement();
+        options.teacher = Some(command.teacher.unwrap_or(DEFAULT_SEED));
+        options.movement = movement.movement();
         clear_the_table(options);
     })?;
     client.require(Capability::Arm).map_err(|error| error.into_failure(DOING))?;
     let nobody = |when: &str| Failure::new(ErrorCode::NobodyToAsk, DOING, format!("nobody can press Enter {when}"));
     let alone = global.non_interactive && command.duration.is_none();
-    if alone && default_posture(&mut client, command.movement).is_none() {
+    if alone && default_posture(&mut client, movement).is_none() {
         return Err(nobody("at the end of the movement"));
     }
-    if command.from.is_some() && default_posture(&mut client, command.movement).is_some() {
+    refuse_absent_teacher(command, &mut client)?;
+    if command.from.is_some() && default_posture(&mut client, movement).is_some() {
         return Err(Failure::new(
             ErrorCode::StartIsFixed,
             DOING,
@@ -107,7 +109,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let failed = |error| connection::failure(error, DOING);
 
-    if let Some(posture) = command.from.or_else(|| default_posture(&mut client, command.movement)) {
+    if let Some(posture) = command.from.or_else(|| default_posture(&mut client, movement)) {
         let spinner = output.spinner("moving to the start");
         let travelled = procedure::travel(&mut client, posture, |passed| {
             spinner.set_message(format!("moving to the start, {passed:.0} s"));
@@ -138,6 +140,20 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         &Taught { file: files::text(&command.output), samples: rows, duration_s: rows as f64 / RATE, gaps },
         format!("{rows} samples, {:.1} s, {gaps} lost", rows as f64 / RATE),
     )
+}
+
+/// Refuses options of the simulated teacher where nobody of the kind stands beside the arm: a person would be asked to
+/// guide it, and nobody would know that they were ignored.
+fn refuse_absent_teacher(command: &Cmd, client: &mut Client<Device>) -> Result<(), Failure> {
+    let given = [("--movement", command.movement.is_some()), ("--teacher", command.teacher.is_some())];
+    match given.into_iter().find(|(_, is_given)| *is_given) {
+        Some((option, _)) if !teacher::is_present(client) => {
+            let cause = format!("`{option}` is for the simulated teacher, and none stands beside this arm");
+            Err(Failure::new(ErrorCode::CommandLine, "teach refused", cause)
+                .help("leave it out; `--device sil:` with the MuJoCo world has a simulated teacher"))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Data of `tactus --json teach`.

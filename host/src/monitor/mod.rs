@@ -94,6 +94,16 @@ impl Watch {
         values.first_chunk().copied()
     }
 
+    /// The newest cycle, if every joint angle has been measured: before, it carries zeros in their place.
+    pub(crate) fn placed(&self) -> Option<&Telemetry> {
+        self.telemetry.as_ref().filter(|cycle| cycle.flags & flags::POSITIONS_KNOWN != 0)
+    }
+
+    /// The newest cycle, if it has a wrench: without a sensor it carries zeros in its place.
+    pub(crate) fn weighed(&self) -> Option<&Telemetry> {
+        self.placed().filter(|cycle| cycle.flags & (flags::TARED | flags::WRENCH_STALE) != flags::WRENCH_STALE)
+    }
+
     /// The adaptation in a few words.
     pub fn adaptation(&self) -> &'static str {
         let bits = self.telemetry.map_or(0, |telemetry| telemetry.flags);
@@ -117,9 +127,7 @@ impl Watch {
         let telemetry = self.telemetry.as_ref();
         let (now, worst) = self.computation_us();
         let hand = (self.status.hand_stage == HandStage::Ready).then_some(telemetry).flatten();
-        // Before every position was measured once, or without a sensor, a cycle carries zeros in their place.
-        let placed = telemetry.filter(|cycle| cycle.flags & flags::POSITIONS_KNOWN != 0);
-        let weighed = placed.filter(|cycle| cycle.flags & (flags::TARED | flags::WRENCH_STALE) != flags::WRENCH_STALE);
+        let (placed, weighed) = (self.placed(), self.weighed());
         Line {
             state: self.state(),
             fault: self.fault().map(|fault| format!("{fault:?}")),

@@ -92,25 +92,30 @@ fn heading(watch: &Watch, width: u16) -> Vec<Line<'static>> {
 }
 
 fn joint_lines(watch: &Watch, width: u16) -> Vec<Line<'static>> {
-    let known = watch.status.zeroed || watch.telemetry.is_some();
-    let q = watch.telemetry.map_or(watch.status.q, |telemetry| telemetry.q);
+    let newest = watch.placed();
+    // The status alone has no speed and no torque, and an arm that is zeroed may not have been read since.
+    let q =
+        newest.map(|cycle| cycle.q).or((watch.telemetry.is_none() && watch.status.zeroed).then_some(watch.status.q));
     (0..7)
         .map(|joint| {
             let name = format!("J{} ", joint + 1);
-            if !known {
-                return Line::raw(format!("{name} not zeroed"));
-            }
+            let Some(q) = q else {
+                return Line::raw(format!(
+                    "{name} {}",
+                    if watch.status.zeroed { "not read yet" } else { "not zeroed" }
+                ));
+            };
             let (angle, low, high) = (f64::from(q[joint]), SOFT_MIN[joint], SOFT_MAX[joint]);
             let room = usize::from(width).saturating_sub(64);
             let near = (angle - low).min(high - angle) < 0.1;
-            let (dq, tau) = watch
-                .telemetry
-                .map_or((0.0, 0.0), |telemetry| (f64::from(telemetry.dq[joint]), f64::from(telemetry.tau[joint])));
-            let share = tau.abs() / TORQUE_LIMITS[joint];
+            let speed = newest.map_or_else(|| "    -".to_owned(), |cycle| format!("{:+6.2}", cycle.dq[joint]));
+            let tau = watch.telemetry.map(|cycle| f64::from(cycle.tau[joint]));
+            let torque = tau.map_or_else(|| "     -".to_owned(), |tau| format!("{tau:+6.1}"));
+            let share = tau.unwrap_or(0.0).abs() / TORQUE_LIMITS[joint];
             Line::from(vec![
                 Span::raw(format!("{name}{angle:+7.3} rad {low:+5.2}[")),
                 Span::styled(marked(angle, low, high, room), if near { WARNING } else { GOOD }),
-                Span::raw(format!("]{high:+5.2} {dq:+6.2} rad/s {tau:+6.1} N m [")),
+                Span::raw(format!("]{high:+5.2} {speed:>6} rad/s {torque} N m [")),
                 Span::styled(filled(share, 8), if share > 0.8 { WARNING } else { GOOD }),
                 Span::raw("]"),
             ])
@@ -119,7 +124,14 @@ fn joint_lines(watch: &Watch, width: u16) -> Vec<Line<'static>> {
 }
 
 fn wrench_lines(watch: &Watch, width: u16) -> Vec<Line<'static>> {
-    let Some(telemetry) = watch.telemetry else { return vec![Line::raw("no cycles yet")] };
+    let Some(telemetry) = watch.weighed() else {
+        let why = match (watch.telemetry, watch.placed()) {
+            (None, _) => "no cycles yet",
+            (Some(_), None) => "not known before the joint angles",
+            (Some(_), Some(_)) => "not measured: no force sensor answers",
+        };
+        return vec![Line::raw(why)];
+    };
     let expected = watch.expected();
     let room = usize::from(width).saturating_sub(19);
     let axes = [("fx", "N  "), ("fy", "N  "), ("fz", "N  "), ("tx", "N m"), ("ty", "N m"), ("tz", "N m")];
@@ -159,11 +171,12 @@ fn hand_lines(watch: &Watch, width: u16) -> Vec<Line<'static>> {
 
 fn health_lines(watch: &Watch) -> Vec<Line<'static>> {
     let (now, worst) = watch.computation_us();
+    let now = watch.telemetry.map_or_else(|| "-".to_owned(), |_| format!("{now:.0} us"));
     let counters = &watch.statistics;
     let style = |count: u32| if count > 0 { WARNING } else { Style::new() };
     vec![
         Line::from(vec![
-            Span::raw(format!("loop {now:.0} us, worst {worst:.0} us   ")),
+            Span::raw(format!("loop {now}, worst {worst:.0} us   ")),
             Span::styled(format!("missed {}", counters.missed_deadlines), style(counters.missed_deadlines)),
             Span::raw("   "),
             Span::styled(format!("lost replies {}", counters.lost_replies), style(counters.lost_replies)),

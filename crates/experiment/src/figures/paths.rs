@@ -11,6 +11,8 @@ const SCALE: f64 = 1150.0;
 const LEFT: f64 = 90.0;
 const TOP: f64 = 130.0;
 const PANEL_GAP: f64 = 70.0;
+/// Width of a letter of the caption, px.
+const CAPTION_LETTER: f64 = 9.0;
 /// Ways whose object was not held.
 const FAINT: &str = "#bbbbbb";
 
@@ -40,10 +42,12 @@ pub fn draw(
     };
     let (x, y) = (range(0), range(1));
     let size = [(x[1] - x[0]) * SCALE * 0.6, (y[1] - y[0]) * SCALE * 0.6];
-    let width = LEFT + modes.len() as f64 * (size[0] + PANEL_GAP);
+    let caption = "from above, the arm on the left; colour: ways that ended with the object held, discs: objects held, crosses: not held, dashed: as taught";
+    let panels = modes.len() as f64 * (size[0] + PANEL_GAP);
+    // The caption is wider than the panels of one or two modes.
+    let width = LEFT + panels.max(CAPTION_LETTER * caption.len() as f64);
     let mut drawing = Drawing::new(width, TOP + size[1] + 100.0);
     drawing.text([LEFT, 48.0], title, 26, Anchor::Start, INK);
-    let caption = "from above, the arm on the left; colour: ways that ended with the object held, discs: objects held, crosses: not held, dashed: as taught";
     drawing.text([LEFT, 78.0], caption, 16, Anchor::Start, GREY);
     for (column, mode) in modes.iter().enumerate() {
         let corner = [LEFT + column as f64 * (size[0] + PANEL_GAP), TOP];
@@ -84,6 +88,17 @@ pub fn draw(
 mod tests {
     use super::*;
     use crate::fixtures;
+
+    #[test]
+    fn the_caption_of_a_single_mode_is_not_cut() {
+        let mut results = fixtures::results(&[1]);
+        results.reports.retain(|report| report.key.mode == lab::procedure::Mode::Adaptive);
+        let svg = draw(&results, &Grid::paper(), &fixtures::frame(), &[], "Torch", 0.028).to_inline_svg();
+        let width: f64 = svg.split_once("viewBox=\"0 0 ").unwrap().1.split_once(' ').unwrap().0.parse().unwrap();
+        let caption = svg.split('>').find_map(|text| text.strip_prefix("from above")).unwrap();
+        let letters = "from above".len() + caption.split_once('<').unwrap().0.len();
+        assert!(width >= LEFT + 0.56 * 16.0 * letters as f64, "{letters} letters on {width} px");
+    }
 
     #[test]
     fn every_mode_has_its_panel() {

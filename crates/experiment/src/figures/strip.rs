@@ -30,9 +30,11 @@ pub fn write(trial: &Trial, file: &Path) -> Result<(), RenderError> {
 fn frames(trial: &Trial) -> Vec<Scene> {
     let m = &trial.report.measures;
     let run = trial.marks.run;
-    let touch = m.touch_s.unwrap_or(0.6 * m.closing_s).min(m.closing_s);
+    // Fingers that never close are shown as those that close with the lift.
+    let closing = m.closed();
+    let touch = m.touch_s.unwrap_or(0.6 * closing).min(closing);
     let end = trial.snapshots.last().map_or(run, |snapshot| snapshot.time);
-    let times: [f64; FRAMES] = [run, run + touch, run + 0.5 * (touch + m.closing_s), run + m.lift_s, end];
+    let times: [f64; FRAMES] = [run, run + touch, run + 0.5 * (touch + closing), run + m.lift_s, end];
     times
         .into_iter()
         .filter_map(|time| {

@@ -3,7 +3,7 @@
 use lab::plot::drawing::{Anchor, Colour, Drawing, Frame, GREY, INK, PALE, plain};
 
 use super::colour;
-use crate::grid::Grid;
+use crate::grid::{Cell, Grid};
 use crate::map::short;
 use crate::results::Results;
 use lab::procedure::Mode;
@@ -15,6 +15,10 @@ const GAP: f64 = 3.0;
 const LEFT: f64 = 150.0;
 const TOP: f64 = 110.0;
 const LEGEND: f64 = 470.0;
+/// Least width of the axes, px: what stands below them shall not reach into the legend.
+const LEAST_WIDTH: f64 = 300.0;
+/// Space that a number along an axis takes, px.
+const LABEL: [f64; 2] = [46.0, 20.0];
 
 /// The map of an experiment; `title` says what was grasped, `radius` is the object's, m.
 ///
@@ -22,12 +26,17 @@ const LEGEND: f64 = 470.0;
 /// proportion.
 pub fn draw(results: &Results, grid: &Grid, title: &str, radius: f64) -> Drawing {
     let (columns, rows) = (grid.columns(), grid.rows());
-    let pitch = [pitch(&columns), pitch(&rows)];
-    let range = |values: &[i32], pitch: f64| {
-        let (low, high) = values.iter().fold((i32::MAX, i32::MIN), |(low, high), &v| (low.min(v), high.max(v)));
-        [f64::from(low) - 0.5 * pitch, f64::from(high) + 0.5 * pitch]
+    let pitch =
+        if columns.len() * rows.len() == grid.cells.len() { [pitch(&columns), pitch(&rows)] } else { [apart(grid); 2] };
+    // The place where the primitive expects the object belongs to the picture, whether or not a cell is there.
+    let range = |values: &[i32], pitch: f64, least: f64| {
+        let (low, high) = values.iter().fold((0, 0), |(low, high), &v| (low.min(v), high.max(v)));
+        let around = radius * 1e3 + GAP;
+        let (low, high) = ((f64::from(low) - 0.5 * pitch).min(-around), (f64::from(high) + 0.5 * pitch).max(around));
+        let more = 0.5 * (least - (high - low)).max(0.0);
+        [low - more, high + more]
     };
-    let (x, y) = (range(&columns, pitch[0]), range(&rows, pitch[1]));
+    let (x, y) = (range(&columns, pitch[0], LEAST_WIDTH / SCALE), range(&rows, pitch[1], 0.0));
     let size = [(x[1] - x[0]) * SCALE, (y[1] - y[0]) * SCALE];
     let frame = Frame { corner: [LEFT, TOP], size, x, y };
     let mut drawing = Drawing::new(LEFT + size[0] + LEGEND, (TOP + size[1] + 90.0).max(TOP + 350.0));
@@ -42,7 +51,7 @@ pub fn draw(results: &Results, grid: &Grid, title: &str, radius: f64) -> Drawing
     drawing.text([LEFT, 78.0], tried, 16, Anchor::Start, GREY);
     for (index, cell) in grid.cells.iter().enumerate() {
         let middle = frame.at([f64::from(cell.along_mm), f64::from(cell.sideways_mm)]);
-        let side = pitch.map(|pitch| pitch * SCALE - GAP);
+        let side = pitch.map(|pitch| (pitch * SCALE - GAP).max(1.0));
         let mut left = middle[0] - side[0] / 2.0;
         for (share, fill) in parts(results, index) {
             drawing.rectangle([left, middle[1] - side[1] / 2.0], [share * side[0], side[1]], fill);
@@ -66,6 +75,15 @@ fn pitch(values: &[i32]) -> f64 {
     f64::from(steps.min().unwrap_or(LARGEST).min(LARGEST))
 }
 
+/// Side of the largest squares about cells that lie anywhere, as those of a turned grid, in which none covers another,
+/// mm.
+fn apart(grid: &Grid) -> f64 {
+    let distance = |a: &Cell, b: &Cell| (a.along_mm - b.along_mm).abs().max((a.sideways_mm - b.sideways_mm).abs());
+    let cells = grid.cells.iter().enumerate();
+    let pairs = cells.flat_map(|(index, a)| grid.cells[..index].iter().map(move |b| distance(a, b)));
+    f64::from(pairs.min().unwrap_or(LARGEST).min(LARGEST))
+}
+
 /// Shares of a cell by the simplest mode that holds there, and what is left; nothing of a cell that was not tried.
 fn parts(results: &Results, index: usize) -> Vec<(f64, Colour)> {
     let mut parts = Vec::new();
@@ -85,14 +103,24 @@ fn parts(results: &Results, index: usize) -> Vec<(f64, Colour)> {
     parts
 }
 
+/// Values with their places, without those that stand less than `room` px behind the one before.
+fn spread(values: &[i32], room: f64, place: impl Fn(f64) -> f64) -> Vec<(i32, f64)> {
+    let mut kept: Vec<(i32, f64)> = Vec::new();
+    for &value in values {
+        let at = place(f64::from(value));
+        if kept.last().is_none_or(|(_, last)| (at - last).abs() >= room) {
+            kept.push((value, at));
+        }
+    }
+    kept
+}
+
 fn axis_labels(drawing: &mut Drawing, frame: &Frame, columns: &[i32], rows: &[i32]) {
     let cm = |millimetres: i32| plain(f64::from(millimetres) * 0.1);
-    for &column in columns.iter() {
-        let [x, _] = frame.at([f64::from(column), 0.0]);
+    for (column, x) in spread(columns, LABEL[0], |column| frame.at([column, 0.0])[0]) {
         drawing.text([x, frame.bottom() + 24.0], cm(column), 16, Anchor::Middle, GREY);
     }
-    for &row in rows {
-        let [_, y] = frame.at([0.0, f64::from(row)]);
+    for (row, y) in spread(rows, LABEL[1], |row| frame.at([0.0, row])[1]) {
         drawing.text([frame.corner[0] - 10.0, y + 6.0], cm(row), 16, Anchor::End, GREY);
     }
     let middle = frame.corner[0] + frame.size[0] / 2.0;
@@ -164,6 +192,46 @@ mod tests {
         }
         assert_eq!(parts(&results, 7), [(1.0, PALE)]);
         assert_eq!(parts(&results, 999), [], "nobody tried it: it is not shown as one that failed");
+    }
+
+    /// An attribute of every element of a kind, and the text in it.
+    fn attributes(svg: &str, element: &str, name: &str) -> Vec<(f64, String)> {
+        let of = |text: &str| {
+            let value = text.split_once(&format!(" {name}=\""))?.1.split_once('"')?.0.parse().ok()?;
+            Some((value, text.split_once('>')?.1.split_once('<')?.0.to_owned()))
+        };
+        svg.split(&format!("<{element}")).skip(1).filter_map(of).collect()
+    }
+
+    #[test]
+    fn grids_that_are_turned_fine_or_far_away_give_cells_labels_and_the_goal_their_places() {
+        let results = fixtures::results(&[1]);
+        let turned = Grid::paper().moved(30.0, [0.01, 0.0]);
+        let far: Grid = "-24:8,-20:8".parse().unwrap();
+        for grid in [Grid::paper(), turned, far, Grid::spread(64, 64).unwrap()] {
+            let svg = draw(&results, &grid, "Torch", 0.028).to_inline_svg();
+            for side in ["width", "height"] {
+                let sides = attributes(&svg, "rect", side);
+                assert!(sides.iter().all(|(side, _)| *side > 0.0), "{side} of {} cells: {sides:?}", grid.cells.len());
+            }
+            // The circle of the goal stands left of the legend.
+            let legend = attributes(&svg, "text", "x").into_iter().find(|(_, text)| text.starts_with("held after"));
+            let legend = legend.unwrap().0;
+            let goal = attributes(&svg, "circle", "cx")[0].0;
+            assert!(goal + 0.028e3 * SCALE < legend, "{goal} beside a legend at {legend}");
+            let below = attributes(&svg, "text", "x").into_iter().find(|(_, text)| text.starts_with("object along"));
+            assert!(below.unwrap().0 + 0.28 * 17.0 * 29.0 < legend, "what stands below the axis meets the legend");
+            // No number stands on another.
+            let numbers = attributes(&svg, "text", "x").into_iter().zip(attributes(&svg, "text", "y"));
+            let numbers: Vec<_> =
+                numbers.filter(|((_, text), _)| text.replace('\u{2212}', "-").parse::<f64>().is_ok()).collect();
+            for (index, ((x, text), (y, _))) in numbers.iter().enumerate() {
+                for ((other_x, other), (other_y, _)) in &numbers[..index] {
+                    let is_clear = (x - other_x).abs() >= 40.0 || (y - other_y).abs() >= 16.0;
+                    assert!(is_clear, "{text} and {other} of {} cells", grid.cells.len());
+                }
+            }
+        }
     }
 
     #[test]

@@ -102,7 +102,8 @@ pub fn write(
             .map(|trial| (trial.report.key.mode, &trial.trace))
             .collect();
         let measures = &shown[shown.len() - 1].report.measures;
-        let marks = [(measures.closing_s, "fingers close"), (measures.lift_s, "lift")];
+        let closing = measures.closing_s.map(|time| (time, "fingers close"));
+        let marks: Vec<_> = closing.into_iter().chain([(measures.lift_s, "lift")]).collect();
         let cell = shown[0].report.key.cell;
         let title = format!("{title} at {cell} cm from where it is expected");
         put(series::draw(&runs, expected.as_ref(), &marks, &title), "series")?;

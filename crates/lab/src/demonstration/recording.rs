@@ -325,6 +325,10 @@ impl<'a> Table<'a> {
             // The reader's own line is that of the last byte it skipped, notes included: count from the offset.
             let offset = record.position().map_or(0, csv::Position::byte);
             let line = newlines.line_at(offset as usize);
+            if record.len() == 1 && record.iter().all(<[u8]>::is_empty) {
+                // A line of spaces is as empty as one without.
+                continue;
+            }
             if table.names.is_empty() {
                 table.read_header(line, &record)?;
             } else {

@@ -20,6 +20,9 @@ const LEGEND_SIZE: u32 = 16;
 const LEGEND_HEIGHT: f64 = 44.0;
 const LEGEND_LINE: f64 = 52.0;
 const LEGEND_GAP: f64 = 40.0;
+const TITLE_SIZE: u32 = 22;
+/// Space that no title and no legend takes, at either side of the page, px.
+const MARGIN: f64 = 20.0;
 
 /// Points that a curve has at most: two per pixel column of the widest panel.
 const MOST_POINTS: usize = 1000;
@@ -131,9 +134,12 @@ pub struct Page {
 impl Page {
     /// Draws the page.
     pub fn draw(&self) -> Drawing {
-        let height = TITLE_HEIGHT + self.rows.len() as f64 * ROW_HEIGHT + LEGEND_HEIGHT;
+        let legend = self.legend_lines();
+        let panels = TITLE_HEIGHT + self.rows.len() as f64 * ROW_HEIGHT;
+        let height = panels + legend.len().max(1) as f64 * LEGEND_HEIGHT;
         let mut drawing = Drawing::new(PAGE_WIDTH, height);
-        drawing.text([PAGE_WIDTH / 2.0, 30.0], self.title.clone(), 22, Anchor::Middle, INK);
+        let title = fitted(&self.title, TITLE_SIZE, PAGE_WIDTH - 2.0 * MARGIN);
+        drawing.text([PAGE_WIDTH / 2.0, 30.0], title, TITLE_SIZE, Anchor::Middle, INK);
         for (row, panels) in self.rows.iter().enumerate() {
             let width = PAGE_WIDTH / panels.len().max(1) as f64;
             for (column, panel) in panels.iter().enumerate() {
@@ -150,22 +156,60 @@ impl Page {
                 }
             }
         }
-        self.draw_legend(&mut drawing, height - LEGEND_HEIGHT / 2.0);
+        for (line, entries) in legend.iter().enumerate() {
+            draw_legend(entries, &mut drawing, panels + (line as f64 + 0.5) * LEGEND_HEIGHT);
+        }
         drawing
     }
 
-    /// One line below the panels.
-    fn draw_legend(&self, drawing: &mut Drawing, y: f64) {
-        let text_width = |label: &str| label.chars().count() as f64 * 0.56 * f64::from(LEGEND_SIZE);
-        let width = |label: &str| LEGEND_LINE + 10.0 + text_width(label) + LEGEND_GAP;
-        let whole: f64 = self.legend.iter().map(|(_, label)| width(label)).sum();
-        let mut x = (PAGE_WIDTH - whole + LEGEND_GAP) / 2.0;
+    /// The legend in lines that fit the page: names of files are as long as people make them.
+    fn legend_lines(&self) -> Vec<Vec<(Ink, String)>> {
+        let room = PAGE_WIDTH - 2.0 * MARGIN;
+        let mut lines: Vec<Vec<(Ink, String)>> = Vec::new();
+        let mut taken = f64::INFINITY;
         for (ink, label) in &self.legend {
-            ink.line(drawing, &[[x, y], [x + LEGEND_LINE, y]]);
-            let at = [x + LEGEND_LINE + 10.0, y + f64::from(LEGEND_SIZE) * 0.36];
-            drawing.text(at, label.clone(), LEGEND_SIZE, Anchor::Start, INK);
-            x += width(label);
+            let label = fitted(label, LEGEND_SIZE, room - LEGEND_LINE - 10.0);
+            let width = legend_width(&label);
+            // The gap behind the last one needs no room.
+            if taken + width - LEGEND_GAP > room {
+                lines.push(Vec::new());
+                taken = 0.0;
+            }
+            taken += width;
+            lines.last_mut().into_iter().for_each(|line| line.push((*ink, label.clone())));
         }
+        lines
+    }
+}
+
+/// Width of a text, px: that of its letters in the mean.
+fn text_width(text: &str, size: u32) -> f64 {
+    text.chars().count() as f64 * 0.56 * f64::from(size)
+}
+
+/// A text that is no wider than `width` px; of a longer one the end is left out.
+fn fitted(text: &str, size: u32, width: f64) -> String {
+    if text_width(text, size) <= width {
+        return text.to_owned();
+    }
+    let letters = (width / text_width("m", size)) as usize;
+    format!("{}\u{2026}", text.chars().take(letters.saturating_sub(1)).collect::<String>().trim_end())
+}
+
+/// Width of an entry of a legend with the gap behind it, px.
+fn legend_width(label: &str) -> f64 {
+    LEGEND_LINE + 10.0 + text_width(label, LEGEND_SIZE) + LEGEND_GAP
+}
+
+/// One line of a legend.
+fn draw_legend(entries: &[(Ink, String)], drawing: &mut Drawing, y: f64) {
+    let whole: f64 = entries.iter().map(|(_, label)| legend_width(label)).sum();
+    let mut x = (PAGE_WIDTH - whole + LEGEND_GAP) / 2.0;
+    for (ink, label) in entries {
+        ink.line(drawing, &[[x, y], [x + LEGEND_LINE, y]]);
+        let at = [x + LEGEND_LINE + 10.0, y + f64::from(LEGEND_SIZE) * 0.36];
+        drawing.text(at, label.clone(), LEGEND_SIZE, Anchor::Start, INK);
+        x += legend_width(label);
     }
 }
 
@@ -235,6 +279,47 @@ fn thin(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Places (x, width, anchor) of the texts of a page as SVG, those that lie over its edge.
+    fn cut_off(page: &Page) -> Vec<String> {
+        let svg = page.draw().to_inline_svg();
+        let texts = svg.split("<text ").skip(1).filter_map(|text| {
+            let attribute = |name: &str| Some(text.split_once(&format!("{name}=\""))?.1.split_once('"')?.0);
+            let content = text.split_once('>')?.1.split_once('<')?.0;
+            let (x, size) = (attribute("x")?.parse::<f64>().ok()?, attribute("font-size")?.parse::<u32>().ok()?);
+            let width = text_width(content, size);
+            let from = match attribute("text-anchor")? {
+                "middle" => x - width / 2.0,
+                "end" => x - width,
+                _ => x,
+            };
+            Some((from, from + width, content.to_owned()))
+        });
+        let texts: Vec<_> = texts.collect();
+        assert!(!texts.is_empty(), "{svg}");
+        texts.into_iter().filter(|(from, to, _)| *from < 0.0 || *to > PAGE_WIDTH).map(|(.., text)| text).collect()
+    }
+
+    #[test]
+    fn a_long_title_and_names_of_many_long_files_stay_on_the_page() {
+        let inks = [Ink::Execution, Ink::First, Ink::Second, Ink::Third, Ink::Plan];
+        let legend = |name: &str| inks.map(|ink| (ink, name.to_owned())).to_vec();
+        let page = |title: &str, name: &str| Page {
+            title: title.to_owned(),
+            x_label: "time (s)".to_owned(),
+            x_range: (0.0, 1.0),
+            rows: Vec::new(),
+            legend: legend(name),
+        };
+        for (title, name) in [("reach", "run.csv"), (&"long ".repeat(100), "a".repeat(60).as_str())] {
+            assert_eq!(cut_off(&page(title, name)), Vec::<String>::new(), "{title}");
+        }
+        let long = page(&"long ".repeat(100), &"b".repeat(500));
+        assert_eq!(cut_off(&long), Vec::<String>::new());
+        assert!(long.draw().to_inline_svg().contains('\u{2026}'));
+        // A title that fits is not touched.
+        assert!(page("reach: plan", "run.csv").draw().to_inline_svg().contains("reach: plan"));
+    }
 
     #[test]
     fn thinning_keeps_a_single_peak() {

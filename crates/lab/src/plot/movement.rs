@@ -64,12 +64,13 @@ impl Movement {
         .filter_map(|(ink, path)| path.map(|path| (ink, path)))
         .filter(|(_, path)| !path.time.is_empty())
         .collect();
-        let goal = plan
-            .or(self.demonstration.as_ref())
-            .or(execution.as_ref())
-            .and_then(|path| path.orientation.last())
-            .ok_or(PlotError::Nothing)?;
-        let mut rows = vec![position_panels(&paths), orientation_panels(&paths, goal)];
+        let end = |path: Option<&PosePath>| path.and_then(|path| path.orientation.last().copied());
+        // A plan that was bent, or a run that was stopped, ends elsewhere than at the goal.
+        let (end, from) = match end(self.plan.as_ref()).or(end(self.demonstration.as_ref())) {
+            Some(goal) => (goal, "from the goal (deg)"),
+            None => (end(plan).or(end(execution.as_ref())).ok_or(PlotError::Nothing)?, "from its end (deg)"),
+        };
+        let mut rows = vec![position_panels(&paths), orientation_panels(&paths, &end, from)];
         let mut legend: Vec<(Ink, String)> =
             [(Ink::Demonstration, "demonstration"), (Ink::Plan, "plan"), (Ink::Execution, "execution")]
                 .into_iter()
@@ -151,14 +152,14 @@ fn position_panels(paths: &[(Ink, &PosePath)]) -> Vec<Panel> {
         .collect()
 }
 
-fn orientation_panels(paths: &[(Ink, &PosePath)], goal: &[f64; 4]) -> Vec<Panel> {
+fn orientation_panels(paths: &[(Ink, &PosePath)], goal: &[f64; 4], from: &str) -> Vec<Panel> {
     let vectors: Vec<Vec<[f64; 3]>> = paths.iter().map(|(_, path)| rotation_vectors(goal, &path.orientation)).collect();
     ["x", "y", "z"]
         .iter()
         .enumerate()
         .map(|(axis, name)| Panel {
             title: format!("Orientation about {name}"),
-            y_label: "from the goal (deg)".to_owned(),
+            y_label: from.to_owned(),
             curves: paths
                 .iter()
                 .zip(&vectors)
@@ -315,6 +316,34 @@ mod tests {
     fn about(axis: [f64; 3], angle: f64) -> [f64; 4] {
         let (s, c) = (angle / 2.0).sin_cos();
         [c, s * axis[0], s * axis[1], s * axis[2]]
+    }
+
+    /// A run whose plan was bent by 0.2 rad about x, and ends there.
+    #[test]
+    fn angles_are_those_to_the_goal_that_was_taught_and_to_the_end_where_nobody_knows_the_goal() {
+        let path = |end: f64| PosePath {
+            time: vec![0.0, 1.0],
+            position: vec![[0.0; 3]; 2],
+            orientation: vec![[1.0, 0.0, 0.0, 0.0], about([1.0, 0.0, 0.0], end)],
+        };
+        let mut text = String::from("t_s,x_m,y_m,z_m,qw,qx,qy,qz,x_d_m,y_d_m,z_d_m,qw_d,qx_d,qy_d,qz_d\n");
+        for k in 0..100 {
+            let [w, x, ..] = about([1.0, 0.0, 0.0], 0.7 * f64::from(k) / 99.0);
+            text += &format!("{},0,0,0,{w},{x},0,0,0,0,0,{w},{x},0,0\n", f64::from(k) * 0.01);
+        }
+        let execution = Recording::parse(std::path::Path::new("run.csv"), text.as_bytes()).unwrap();
+        let mut movement = Movement { plan: Some(path(0.5)), execution: Some(execution), ..Movement::default() };
+        let about_x = |movement: &Movement| {
+            let page = movement.page().unwrap();
+            let panel = page.rows[1][0].clone();
+            let plan = panel.curves.into_iter().find(|curve| curve.ink == Ink::Plan).unwrap();
+            (panel.y_label, plan.points.last().unwrap().1)
+        };
+        let (label, end) = about_x(&movement);
+        assert!(label == "from the goal (deg)" && (end - 0.2_f64.to_degrees()).abs() < 1e-6, "{label}: {end}");
+        movement.plan = None;
+        let (label, end) = about_x(&movement);
+        assert!(label == "from its end (deg)" && end.abs() < 1e-6, "{label}: {end}");
     }
 
     #[test]

@@ -98,8 +98,13 @@ impl Figures<'_> {
     }
 
     fn orientations(&self) -> Vec<Panel> {
-        let goal = self.runs.first().and_then(|run| run.running.orientation_d.as_ref()?.last().copied());
-        let Some(goal) = goal else { return Vec::new() };
+        let end = || self.runs.first().and_then(|run| run.running.orientation_d.as_ref()?.last().copied());
+        // A plan that was bent, or a run that was stopped, ends elsewhere than at the goal.
+        let (goal, named) = match (self.primitive.map(|primitive| primitive.goal.orientation), end()) {
+            (Some(goal), _) => (goal, "the goal"),
+            (None, Some(end)) => (end, "where the plan ended,"),
+            (None, None) => return Vec::new(),
+        };
         let vectors = |path: &Option<Vec<[f64; 4]>>| rotation_vectors(&goal, path.as_deref().unwrap_or_default());
         let measured: Vec<_> = self.runs.iter().map(|run| vectors(&run.running.orientation)).collect();
         let planned: Vec<_> = self.runs.iter().map(|run| vectors(&run.running.orientation_d)).collect();
@@ -109,7 +114,7 @@ impl Figures<'_> {
                 Some(all.get(place(run)?)?.get(at)?[axis].to_degrees())
             };
             self.panel(
-                format!("Angle to the goal about {}", ["x", "y", "z"][axis]),
+                format!("Angle to {named} about {}", ["x", "y", "z"][axis]),
                 "deg",
                 4.0,
                 None,

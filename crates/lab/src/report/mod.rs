@@ -11,7 +11,7 @@ use std::path::Path;
 use control::{Fault, State};
 use dmp::CanonicalSystem;
 
-use crate::demonstration::{Recording, RecordingError, recording};
+use crate::demonstration::{Recording, RecordingError, layout, recording};
 use crate::input_file;
 use crate::primitive_file::PrimitiveFile;
 use crate::procedure::FlagCounts;
@@ -94,6 +94,17 @@ impl ReportedRun {
         let bytes = input_file::read(file, input_file::LONGEST_RECORDING)
             .map_err(|cause| RecordingError::Unreadable { file: file.to_owned(), cause })?;
         let recording = Recording::parse(file, &bytes)?;
+        // Without them nobody can say where a run began, how it ended, or how far it came.
+        let told = [(layout::STATE, recording.state.is_none()), (layout::PHASE, recording.phase.is_none())];
+        let missing: Vec<&str> = told.iter().filter(|(_, is_missing)| *is_missing).map(|(name, _)| *name).collect();
+        if !missing.is_empty() {
+            return Err(RecordingError::MissingColumns {
+                file: file.to_owned(),
+                line: recording.header_line,
+                column: recording.names.len() + 1,
+                missing: missing.join(", "),
+            });
+        }
         let notes = recording::notes(&bytes);
         let alpha = primitive.map_or(CanonicalSystem::<f64>::DEFAULT_ALPHA, |primitive| primitive.movement.alpha);
         let running = recording.running();

@@ -13,7 +13,7 @@ use sim::{Lockstep, LockstepError, PlainLine, Plant, Ticks};
 
 use super::board_can::RECORD_BYTES;
 use super::options::{BoardEngine, FlashSource, SimulationOptions};
-use super::processor::SharedProcessor;
+use super::processor::{SharedProcessor, out_of_reach};
 use super::words::Words;
 use super::{Execute, SimulationError};
 use crate::image_file::{ImageFile, ImageFileError};
@@ -31,7 +31,7 @@ const REFUSED: i32 = 2;
 /// The words for the emulator.
 fn command(engine: &BoardEngine, options: &SimulationOptions) -> Result<Command, SimulationError> {
     let mut command = Command::new(&engine.emulator);
-    command.arg("serve").arg("--image").arg(&engine.image);
+    out_of_reach(&mut command).arg("serve").arg("--image").arg(&engine.image);
     match &options.flash {
         FlashSource::New => {}
         FlashSource::File(path) => {

@@ -4,7 +4,15 @@
 //! switch; across two it wakes a sleeping one 20 000 times a second, which was measured to double the time of a run.
 //! Results do not depend on it.
 
-use std::process::Child;
+use std::process::{Child, Command};
+
+/// Has an engine be a process that Ctrl-C does not reach. A terminal sends that to all it has started: the engine would
+/// end at once, and with it the simulated arm that this program is about to stop.
+pub(super) fn out_of_reach(command: &mut Command) -> &mut Command {
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(command, 0);
+    command
+}
 
 /// While it lives, this thread and the child share the processor the thread was on. Does nothing where that is not
 /// possible.

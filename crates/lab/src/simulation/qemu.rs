@@ -8,7 +8,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use flash::FlashChip;
 use sim::{Lockstep, Plant, Ticks};
 
-use super::processor::SharedProcessor;
+use super::processor::{SharedProcessor, out_of_reach};
 use super::words::Words;
 use super::{Execute, SimulationError};
 
@@ -56,7 +56,7 @@ impl Qemu {
         flash: FlashChip,
     ) -> Result<Self, SimulationError> {
         let file = log.map(File::create).transpose().map_err(SimulationError::Log)?;
-        let mut child = Command::new("qemu-system-arm")
+        let mut child = out_of_reach(&mut Command::new("qemu-system-arm"))
             .args(["-machine", machine])
             .args(OPTIONS)
             .arg(image)

@@ -52,6 +52,9 @@ impl FromStr for Address {
     type Err = AddressError;
 
     fn from_str(text: &str) -> Result<Self, AddressError> {
+        if text.contains(char::REPLACEMENT_CHARACTER) {
+            return Err(AddressError::NotText(text.to_owned()));
+        }
         let (kind, rest) = text.split_once(':').ok_or_else(|| AddressError::Kind(text.to_owned()))?;
         match kind {
             "sim" => simulated(SimulatorKind::Qemu, rest),
@@ -61,7 +64,7 @@ impl FromStr for Address {
             "tcp" => match rest.rsplit_once(':') {
                 Some((host, port)) if !host.is_empty() => match port.parse::<u16>() {
                     Ok(_) => Ok(Self::Tcp(rest.to_owned())),
-                    Err(_) => Err(AddressError::Number(port.to_owned())),
+                    Err(_) => Err(AddressError::Number(port.to_owned(), u16::MAX.into())),
                 },
                 _ => Err(AddressError::Incomplete(text.to_owned(), "tcp:localhost:3333")),
             },
@@ -69,7 +72,9 @@ impl FromStr for Address {
             "unix" => Ok(Self::Unix(PathBuf::from(rest))),
             "serial" => {
                 let (port, baud) = match rest.rsplit_once('@') {
-                    Some((port, baud)) => (port, baud.parse().map_err(|_| AddressError::Number(baud.to_owned()))?),
+                    Some((port, baud)) => {
+                        (port, baud.parse().map_err(|_| AddressError::Number(baud.to_owned(), u32::MAX.into()))?)
+                    }
                     None => (rest, DEFAULT_BAUD),
                 };
                 if port.is_empty() || baud == 0 {
@@ -158,10 +163,10 @@ mod tests {
         assert_eq!(parse("usb:1"), Err(AddressError::Kind("usb:1".into())));
         assert!(matches!(parse("tcp:localhost"), Err(AddressError::Incomplete(..))));
         assert!(matches!(parse("tcp::80"), Err(AddressError::Incomplete(..))));
-        assert_eq!(parse("tcp:localhost:http"), Err(AddressError::Number("http".into())));
+        assert_eq!(parse("tcp:localhost:http"), Err(AddressError::Number("http".into(), 65_535)));
         assert!(matches!(parse("unix:"), Err(AddressError::Incomplete(..))));
         assert!(matches!(parse("serial:"), Err(AddressError::Incomplete(..))));
-        assert_eq!(parse("serial:COM3@fast"), Err(AddressError::Number("fast".into())));
+        assert_eq!(parse("serial:COM3@fast"), Err(AddressError::Number("fast".into(), 4_294_967_295)));
         assert!(matches!(parse("can:"), Err(AddressError::Incomplete(..))));
         assert_eq!(parse("can:can0/16"), Err(AddressError::DeviceNumber("16".into())));
         assert_eq!(parse("can:can0/"), Err(AddressError::DeviceNumber(String::new())));
@@ -180,6 +185,13 @@ mod tests {
         for part in ["speed=2", "fault=", "report", "cancellation=maybe", "revision=2003", "revision=0x12345"] {
             assert_eq!(parse(&format!("board:seed=1,{part}")), Err(AddressError::BoardOption(part.into())));
         }
-        assert_eq!(parse("sim:seed=-1"), Err(AddressError::Number("seed=-1".into())));
+        for (text, largest) in
+            [("tcp:localhost:99999", "65535"), ("sil:arm=99999999999999999999", "18446744073709551615")]
+        {
+            let words = parse(text).unwrap_err().to_string();
+            assert!(words.contains(&format!("from 0 to {largest}")), "{words}");
+        }
+        assert!(matches!(parse("unix:/tmp/\u{fffd}.sock"), Err(AddressError::NotText(_))));
+        assert_eq!(parse("sim:seed=-1"), Err(AddressError::Number("seed=-1".into(), u64::MAX)));
     }
 }

@@ -27,9 +27,12 @@ pub enum AddressError {
     /// An option that this simulated device does not have.
     #[error("a hand alone has the options seed=NUMBER, world=empty, line=serial|can and bus=FILE, not '{0}'")]
     HandOption(String),
-    /// A value that is no number.
-    #[error("'{0}': a whole number is expected, without a sign")]
-    Number(String),
+    /// A value that is no number, or one that is too large; the largest there is.
+    #[error("'{0}': a whole number from 0 to {1} is expected")]
+    Number(String, u64),
+    /// A text that was not Unicode: what could not be read was replaced.
+    #[error("'{0}' is no text in UTF-8")]
+    NotText(String),
     /// A device number that there is not.
     #[error("devices on a CAN bus have the numbers 0 to 15, not '{0}'")]
     DeviceNumber(String),

@@ -115,10 +115,12 @@ impl SimulatorOptions {
             }
             match part.split_once('=').filter(|(_, value)| !value.is_empty()) {
                 Some(("seed", value)) => {
-                    options.seed = Some(value.parse().map_err(|_| AddressError::Number(format!("seed={value}")))?);
+                    options.seed =
+                        Some(value.parse().map_err(|_| AddressError::Number(format!("seed={value}"), u64::MAX))?);
                 }
                 Some(("arm", value)) => {
-                    options.arm = Some(value.parse().map_err(|_| AddressError::Number(format!("arm={value}")))?);
+                    options.arm =
+                        Some(value.parse().map_err(|_| AddressError::Number(format!("arm={value}"), u64::MAX))?);
                 }
                 Some(("held", value)) => options.held = Some(value.to_owned()),
                 Some(("world", value)) => options.world = Some(value.to_owned()),

@@ -28,13 +28,13 @@ pub struct Payload {
     #[arg(long, conflicts_with = "carries")]
     pub measure: bool,
     /// Tell what was taken up since this report of the same arm was made, with an empty hand
-    #[arg(long, value_name = "REPORT", requires = "measure")]
+    #[arg(long, value_name = "REPORT", requires = "measure", conflicts_with = "carries")]
     pub without: Option<PathBuf>,
     /// I have brought the arm to its home pose: zero it there if need be
-    #[arg(long, requires = "measure")]
+    #[arg(long, requires = "measure", conflicts_with = "carries")]
     pub at_home: bool,
     /// Write what was measured into a file too, JSON; in a folder it is named with serial number and time
-    #[arg(long, value_name = "FILE", requires = "measure")]
+    #[arg(long, value_name = "FILE", requires = "measure", conflicts_with = "carries")]
     pub report: Option<PathBuf>,
 }
 

@@ -1,0 +1,82 @@
+//! Terminals and the programs that were started in them: a closed one ends what it showed, and its Ctrl-C reaches those
+//! that know how to stop an arm.
+
+#![cfg(target_os = "linux")]
+
+use std::fs::File;
+use std::io::{Read as _, read_to_string};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+
+/// Longest wait for a program that has nothing to wait for.
+const TIMEOUT: Duration = Duration::from_secs(30);
+
+/// Terminals that are closed. One in fifteen was closed while the library for keys read it, which then never returned:
+/// the monitor took a whole processor until somebody killed it.
+const TERMINALS: usize = 40;
+
+/// Shows an arm in a terminal, closes that, and waits for the end of the monitor; false if it goes on.
+fn ends_with_its_terminal(folder: &Path) -> bool {
+    // Only the monitor holds the other end of this pipe.
+    assert!(Command::new("mkfifo").arg(folder.join("alive")).status().unwrap().success());
+    let line = format!(
+        "stty rows 24 cols 80; echo $$ > pid; exec {} --device sil:world=simple monitor 2> alive",
+        env!("CARGO_BIN_EXE_tactus")
+    );
+    let mut terminal = Command::new("script");
+    terminal.args(["-qfc", &line, "/dev/null"]).current_dir(folder).env("XDG_CONFIG_HOME", folder);
+    let mut terminal = terminal.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let alive = folder.join("alive");
+    let (sender, ended) = mpsc::channel();
+    std::thread::spawn(move || sender.send(read_to_string(File::open(alive).unwrap())));
+    let mut shown = terminal.stdout.take().unwrap();
+    let (mut seen, mut bytes) = (Vec::new(), [0; 4096]);
+    while !String::from_utf8_lossy(&seen).contains("joints") {
+        let count = shown.read(&mut bytes).unwrap();
+        assert!(count > 0, "{}", String::from_utf8_lossy(&seen));
+        seen.extend_from_slice(&bytes[..count]);
+    }
+    terminal.kill().unwrap();
+    terminal.wait().unwrap();
+    let has_ended = ended.recv_timeout(TIMEOUT).is_ok();
+    if !has_ended {
+        let process = std::fs::read_to_string(folder.join("pid")).unwrap();
+        let _ = Command::new("kill").args(["-9", process.trim()]).status();
+    }
+    has_ended
+}
+
+/// QEMU ended with the first Ctrl-C, before the arm in it had been stopped: `tactus run` ended with E102.
+#[test]
+fn ctrl_c_does_not_reach_the_emulator_of_a_simulated_arm() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::create_dir(at.join("bin")).unwrap();
+    // Tells its group and that of the program which started it; what a terminal sends goes to a group.
+    let emulator = at.join("bin/qemu-system-arm");
+    let group = |process: &str| format!("awk '{{ print $5 }}' /proc/{process}/stat");
+    let script = format!("#!/bin/sh\n{} > emulator\n{} > tool\n", group("$$"), group("$PPID"));
+    std::fs::write(&emulator, script).unwrap();
+    std::fs::set_permissions(&emulator, std::fs::Permissions::from_mode(0o755)).unwrap();
+    std::fs::write(at.join("arm.elf"), "").unwrap();
+    let path = format!("{}:{}", at.join("bin").display(), std::env::var("PATH").unwrap());
+    let mut tactus = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    tactus.current_dir(at).env("PATH", path).env("TACTUS_IMAGE", at.join("arm.elf")).env("XDG_CONFIG_HOME", at);
+    tactus.args(["--device", "sim:world=simple", "list"]).stdin(Stdio::null());
+    let said = String::from_utf8_lossy(&tactus.output().unwrap().stderr).into_owned();
+    let told = |name: &str| std::fs::read_to_string(at.join(name)).unwrap_or_else(|_| panic!("no emulator: {said}"));
+    let (emulator, tool) = (told("emulator"), told("tool"));
+    assert!(emulator.trim().parse::<u32>().is_ok() && tool.trim().parse::<u32>().is_ok(), "{emulator}{tool}");
+    assert_ne!(emulator, tool, "they get the same signals");
+}
+
+#[test]
+fn a_monitor_ends_with_its_terminal() {
+    for terminal in 0..TERMINALS {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(ends_with_its_terminal(folder.path()), "terminal {terminal}: the monitor goes on");
+    }
+}
