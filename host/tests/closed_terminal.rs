@@ -27,7 +27,8 @@ fn ends_with_its_terminal(folder: &Path) -> bool {
     );
     let mut terminal = Command::new("script");
     terminal.args(["-qfc", &line, "/dev/null"]).current_dir(folder).env("XDG_CONFIG_HOME", folder);
-    let mut terminal = terminal.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let terminal = terminal.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+    let mut terminal = terminal.expect("`script` has to be installed: package bsdutils");
     let alive = folder.join("alive");
     let (sender, ended) = mpsc::channel();
     std::thread::spawn(move || sender.send(read_to_string(File::open(alive).unwrap())));
