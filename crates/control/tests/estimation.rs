@@ -82,10 +82,13 @@ fn turning(motor: usize, step: i32) -> (JointEstimator<f64>, Replies) {
 
 #[test]
 fn a8_a_motor_of_the_arm_between_an_eighth_and_the_whole_of_its_gate_does_not_stop_dead_and_one_of_the_wrist_may() {
-    for motor in 0..7 {
+    // A sixteenth where a plan turns it.
+    for (motor, planned) in (0..7).flat_map(|motor| [(motor, false), (motor, true)]) {
         let gate = gate(motor);
-        for (step, is_fast) in [(gate / 8, false), (gate / 8 + 1, true), (gate, true), (gate + 1, false)] {
+        let slow = gate / if planned { 16 } else { 8 };
+        for (step, is_fast) in [(slow, false), (slow + 1, true), (gate, true), (gate + 1, false)] {
             let (mut estimator, sample) = turning(motor, step);
+            estimator.expect_plan(planned);
             let state = estimator.update(&sample, true).expect("known");
             let stuck = is_fast && motor < 4;
             assert_eq!((state.stuck, state.missing), (stuck, u8::from(stuck)), "M{}: {step} of {gate}", motor + 1);

@@ -315,8 +315,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 _ => self.trigger(Trigger::SoftFault, fault, None),
             }
         }
-        let torque_on = self.supervisor.state().has_torque();
-        let state = self.joints.update(&input.sample.positions, torque_on);
+        self.joints.expect_plan(matches!(self.supervisor.law(), State::Approach | State::Run));
+        let state = self.joints.update(&input.sample.positions, self.supervisor.state().has_torque());
         self.hand.update(input.sample.hand.as_ref());
 
         let mut record = CycleRecord { cycle: input.cycle, ..CycleRecord::EMPTY };

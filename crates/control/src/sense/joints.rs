@@ -39,8 +39,11 @@ const PLAUSIBLE_CHANGE: f64 = 1.5;
 const HARDEST_BLOW: u32 = 4;
 
 /// Part of the largest change of speed from which on a motor of the arm turns too fast to stand still, to the count, in
-/// the next cycle: nothing but an encoder stops so dead.
+/// the next cycle: nothing but an encoder stops so dead, or a joint that is led into its stop.
 const TURNING: i32 = 8;
+
+/// The same where a plan turns it, which keeps off the stops.
+const PLANNED: i32 = 16;
 
 /// Motors of the arm. A blow can stop those of the wrist dead, they have little to carry.
 const ARM_MOTORS: usize = 4;
@@ -105,6 +108,7 @@ pub struct JointEstimator<R: Real> {
     motors: Option<[Motor; JOINTS]>,
     displaced: bool,
     unseen: bool,
+    follows_plan: bool,
     /// Counts per cycle of each motor, from the filtered velocity.
     rates: Vector7<R>,
     filter: LowPass<R, JOINTS>,
@@ -137,6 +141,7 @@ impl<R: Real> JointEstimator<R> {
             motors: None,
             displaced: false,
             unseen: false,
+            follows_plan: false,
             rates: Vector7::zeros(),
             filter: LowPass::new(Butterworth::new(VELOCITY_CUT_OFF, RATE)),
         }
@@ -178,6 +183,11 @@ impl<R: Real> JointEstimator<R> {
         self.unseen
     }
 
+    /// Says if a plan turns the joints: then a motor stands still sooner than it can.
+    pub fn expect_plan(&mut self, follows: bool) {
+        self.follows_plan = follows;
+    }
+
     /// Takes the replies of one cycle. `None` until all seven motors have answered once in the same cycle.
     ///
     /// A jump is carried over where `torque_on` is true, because a step of the position would be a step of the torque.
@@ -187,6 +197,7 @@ impl<R: Real> JointEstimator<R> {
         let Some(motors) = &mut self.motors else {
             return self.begin(replies);
         };
+        let turning = if self.follows_plan { PLANNED } else { TURNING };
         let (mut missing, mut extrapolated) = (0, 0);
         let mut age = 0;
         let mut implausible = false;
@@ -194,10 +205,11 @@ impl<R: Real> JointEstimator<R> {
         let mut angles = Vector7::zeros();
         let mut rates = Vector7::zeros();
         for (index, (motor, reply)) in motors.iter_mut().zip(replies).enumerate() {
+            let gate = self.gate[index];
             let frozen =
-                torque_on && index < ARM_MOTORS && reply.is_some_and(|raw| motor.is_frozen(raw, self.gate[index]));
+                torque_on && index < ARM_MOTORS && reply.is_some_and(|raw| motor.is_frozen(raw, gate, turning));
             stuck |= frozen;
-            let believed = reply.filter(|_| !frozen).and_then(|raw| motor.judge::<R>(raw, self.gate[index], torque_on));
+            let believed = reply.filter(|_| !frozen).and_then(|raw| motor.judge::<R>(raw, gate, torque_on));
             // By the way since the last reply, not by the whole counts per cycle: one count in two cycles is a motion.
             still |= u8::from(believed.as_ref().is_some_and(|believed| believed.rate == R::constant(0.0))) << index;
             implausible |= motor.doubtful.is_some() || believed.as_ref().is_some_and(|believed| believed.jumped);
@@ -269,9 +281,11 @@ impl Motor {
 
     /// True if the motor turned fast and this reply says that it stands where it was. Not beyond the speeds of its own:
     /// who throws the arm into a stop is believed. For as long as a bridge lasts: then it is taken as it is.
-    fn is_frozen(&self, raw: Counts, gate: i32) -> bool {
+    fn is_frozen(&self, raw: Counts, gate: i32, turning: i32) -> bool {
+        let step = self.step.saturating_abs();
         self.age <= COAST_CYCLES
-            && (gate / TURNING + 1..=gate).contains(&self.step.saturating_abs())
+            && step <= gate
+            && step * turning > gate
             && raw.unwrapped_near(Counts(self.counts.0.wrapping_sub(self.offset))).0.wrapping_add(self.offset)
                 == self.counts.0
     }
