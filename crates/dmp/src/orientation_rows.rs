@@ -3,7 +3,7 @@
 //! Here the signs of start and goal are decided, once: never per tick, because a path may exceed 180 degrees.
 
 use crate::orientation::is_near_enough;
-use crate::point_rows::{PointRows, Tick};
+use crate::point_rows::{PointRows, Tick, takes_the_rest};
 use crate::vector::scale;
 use crate::{
     Hemisphere, LogMap, OrientationError, OrientationInput, OrientationReference, OrientationState, OrientationSystem,
@@ -85,7 +85,7 @@ impl<T: Scalar> OrientationRows<T> {
                     let turn = Quaternion::from_rotation_vector(&scale(&rest, tick.goal_fraction));
                     let next = goal.product(&turn).renormalised();
                     // What is less than the last digit of the goal would be lost.
-                    *goal = if next == *goal { *commanded } else { next };
+                    *goal = if next == *goal && takes_the_rest(tick.goal_fraction) { *commanded } else { next };
                 }
                 out
             }

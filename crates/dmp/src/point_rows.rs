@@ -80,9 +80,30 @@ impl<T: Scalar, const D: usize> PointRows<T, D> {
     }
 }
 
+/// Part of the way that the goal filter has to go in a tick for what its digits lose to be gone at once. A movement that
+/// hardly goes on loses more of the way than that.
+const LEAST_FRACTION: f64 = 1e-5;
+
 /// The goal after a tick of the filter. What is less than its last digit would be lost, in f32 a part of the way that a
 /// slow movement has left: that part is gone at once.
 fn towards<T: Scalar>(goal: T, commanded: T, fraction: T) -> T {
     let next = goal + (commanded - goal) * fraction;
-    if next == goal { commanded } else { next }
+    if next == goal && takes_the_rest(fraction) { commanded } else { next }
+}
+
+/// True if a filter that goes so far in a tick loses little of the way to its digits.
+pub(crate) fn takes_the_rest<T: Scalar>(fraction: T) -> bool {
+    fraction > T::from_f64(LEAST_FRACTION)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_filter_takes_what_its_digits_lose_at_once_unless_the_movement_hardly_goes_on() {
+        assert_eq!(towards(10.0f32, 10.01, 2e-5), 10.01, "0.2 um of 10 rad are no step");
+        assert_eq!(towards(10.0f32, 10.3, 1e-8), 10.0, "nor here, and three tenths of a radian are no rest");
+        assert!((towards(10.0f32, 11.0, 1e-3) - 10.001).abs() < 1e-6);
+    }
 }

@@ -94,6 +94,23 @@ fn b5_an_arm_that_is_armed_or_approaches_before_it_has_rested_takes_its_zero_the
     }
 }
 
+/// The change that makes it fail: every Hold takes a zero that is missing.
+#[test]
+fn b5_what_presses_on_a_hand_that_is_led_is_no_zero() {
+    let mut rig = Rig::<f32>::new(START, 1);
+    rig.plant.deaf = true;
+    rig.tick(None);
+    rig.command(Command::Gravity);
+    rig.run_for(0.5);
+    rig.plant.deaf = false;
+    rig.plant.push[2] = 8.0;
+    rig.run_for(0.1);
+    rig.command(Command::Hold);
+    let record = rig.tick(None).record;
+    assert_eq!(record.flags & flags::TARED, 0);
+    assert!((f64::from(record.wrench[2]) - 8.0).abs() < 0.5, "{:?}", record.wrench);
+}
+
 #[test]
 fn the_first_rest_after_start_up_is_the_zero_of_the_sensor() {
     let mut rig = Rig::<f32>::new(START, 1);
