@@ -80,12 +80,12 @@ impl<T: Scalar, const D: usize> PointRows<T, D> {
     }
 }
 
-/// Part of the way that the goal filter has to go in a tick for what its digits lose to be gone at once. A movement that
-/// hardly goes on loses more of the way than that.
+/// Part of the way that the goal filter has to go in a tick for what its digits lose to be gone at once: a movement that
+/// hardly goes on would lose too much.
 const LEAST_FRACTION: f64 = 1e-5;
 
-/// The goal after a tick of the filter. What is less than its last digit would be lost, in f32 a part of the way that a
-/// slow movement has left: that part is gone at once.
+/// The goal after a tick of the filter. What is less than its last digit would be lost, in f32 a part of the way that
+/// a slow movement has left: that part is gone at once.
 fn towards<T: Scalar>(goal: T, commanded: T, fraction: T) -> T {
     let next = goal + (commanded - goal) * fraction;
     if next == goal && takes_the_rest(fraction) { commanded } else { next }
