@@ -80,8 +80,8 @@ impl<T: Scalar, const D: usize> PointRows<T, D> {
     }
 }
 
-/// Part of the way that the goal filter has to go in a tick for what its digits lose to be gone at once: a movement that
-/// hardly goes on would lose too much.
+/// Part of the way that the goal filter has to go in a tick for what its digits lose to be gone at once: in a movement
+/// that hardly goes on it would be too much.
 const LEAST_FRACTION: f64 = 1e-5;
 
 /// The goal after a tick of the filter. What is less than its last digit would be lost, in f32 a part of the way that
