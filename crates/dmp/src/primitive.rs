@@ -222,9 +222,11 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
                 minimum_duration = shortest;
             }
         }
-        // Before the weights: those of a movement learned in millimetres are too large too, and are not the mistake.
+        if let Err(error) = tables.check_weights(&basis, &systems) {
+            // Those of a movement learned in millimetres are too large too, and are not the mistake: its ends are.
+            return Err(tables.check_ends().err().unwrap_or(error));
+        }
         let (start, goal) = tables.check_ends()?;
-        tables.check_weights(&basis, &systems)?;
         Ok(Checked { canonical, basis, systems, minimum_duration, start, goal })
     }
 
