@@ -81,11 +81,7 @@ impl<T: Scalar> OrientationRows<T> {
                 };
                 state.step(&rhs, tick.h);
                 if tick.goal_fraction > T::ZERO {
-                    let rest = goal.conjugate().product(commanded).rotation_vector();
-                    let turn = Quaternion::from_rotation_vector(&scale(&rest, tick.goal_fraction));
-                    let next = goal.product(&turn).renormalised();
-                    // What is less than the last digit of the goal would be lost.
-                    *goal = if next == *goal && takes_the_rest(tick.goal_fraction) { *commanded } else { next };
+                    *goal = turned(goal, commanded, tick.goal_fraction);
                 }
                 out
             }
@@ -146,4 +142,14 @@ impl<T: Scalar> OrientationRows<T> {
             Self::Vector { rows, .. } => rows.settle(),
         }
     }
+}
+
+/// The goal after a tick of the filter. Not inlined: most runs have no goal filter.
+#[inline(never)]
+fn turned<T: Scalar>(goal: &Quaternion<T>, commanded: &Quaternion<T>, fraction: T) -> Quaternion<T> {
+    let rest = goal.conjugate().product(commanded).rotation_vector();
+    let turn = Quaternion::from_rotation_vector(&scale(&rest, fraction));
+    let next = goal.product(&turn).renormalised();
+    // What is less than the last digit of the goal would be lost.
+    if next == *goal && takes_the_rest(fraction) { *commanded } else { next }
 }

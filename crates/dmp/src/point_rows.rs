@@ -52,11 +52,17 @@ impl<T: Scalar, const D: usize> PointRows<T, D> {
             state.step(rhs, tick.h);
         }
         if tick.goal_fraction > T::ZERO {
-            for (goal, commanded) in self.goal.iter_mut().zip(&self.commanded) {
-                *goal = towards(*goal, *commanded, tick.goal_fraction);
-            }
+            self.follow(tick.goal_fraction);
         }
         out
+    }
+
+    /// Lets the goals follow the commanded ones. Not inlined: most runs have no goal filter.
+    #[inline(never)]
+    fn follow(&mut self, fraction: T) {
+        for (goal, commanded) in self.goal.iter_mut().zip(&self.commanded) {
+            *goal = towards(*goal, *commanded, fraction);
+        }
     }
 
     pub(crate) fn command(&mut self, goal: [T; D], filtered: bool) -> Result<(), RolloutError> {

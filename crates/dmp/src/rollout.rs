@@ -190,15 +190,7 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
             return T::ZERO;
         };
         if h != self.goal_fraction.0 {
-            let (x, f) = (a_g * h, T::from_f64);
-            // Of a small exponent by the series: 1 - exp(-x) cancels, and in f32 the filter of a slow movement would be
-            // percents too fast or too slow. The first omitted term is 2e-12 of the sum.
-            let fraction = if x < f(1.0 / 256.0) {
-                x * (T::ONE - x * (f(1.0 / 2.0) - x * (f(1.0 / 6.0) - x * f(1.0 / 24.0))))
-            } else {
-                T::ONE - T::exp(-x)
-            };
-            self.goal_fraction = (h, fraction);
+            self.goal_fraction = (h, part_of_the_way(a_g * h));
         }
         self.goal_fraction.1
     }
@@ -389,5 +381,19 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
     #[inline]
     pub fn is_finished(&self) -> bool {
         self.phase.progress() >= T::ONE
+    }
+}
+
+/// `1 - exp(-x)`. Of a small exponent by the series: the difference cancels, and in f32 the filter of a slow movement
+/// would be percents too fast or too slow. The first omitted term is 2e-12 of the sum.
+///
+/// Not inlined: it is asked where a run with a goal filter changes its speed.
+#[inline(never)]
+fn part_of_the_way<T: Scalar>(x: T) -> T {
+    let f = T::from_f64;
+    if x < f(1.0 / 256.0) {
+        x * (T::ONE - x * (f(1.0 / 2.0) - x * (f(1.0 / 6.0) - x * f(1.0 / 24.0))))
+    } else {
+        T::ONE - T::exp(-x)
     }
 }
