@@ -16,6 +16,7 @@ mod hand;
 mod hot;
 mod house;
 mod lane;
+mod miri;
 mod mutants;
 mod origin;
 mod package;
@@ -65,6 +66,7 @@ cargo xtask <verb>
   faults storm [--wide] [--runs N] [--seed S]   random faults and orders; one run prints itself as a scenario
   faults endurance [--hours H] [--seed S]   such storms on one arm in one process, H hours of simulated time, 0.25 unless given
   fuzz [COUNT]   COUNT random link frames and as many CAN frames, a tenth of it random sessions; 1000000 unless given
+  miri     unit tests of the device's crates in an interpreter that finds undefined behaviour; needs the nightly toolchain
   margins  every control law on an arm without friction, kicked: what is left, worst pose, frequency
   house    module circles, sizes, old words, arrows between crates; cargo xtask house RULE: one of the rules
 
@@ -152,6 +154,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["faults", rest @ ..] => faults(rest)?,
         ["fuzz"] => fuzz::run(fuzz::USUAL)?,
         ["fuzz", count] => fuzz::run(count.parse().with_context(|| format!("no number: {count}"))?)?,
+        ["miri"] => miri::run()?,
         ["margins"] => margins()?,
         ["package"] => package::run()?,
         ["mutants"] => mutants::run("")?,
