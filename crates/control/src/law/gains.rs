@@ -20,6 +20,7 @@ struct Numbers {
     moment_share: f64,
     force_window: usize,
     force_limit: (f64, f64),
+    friction_speed: f64,
 }
 
 /// Exact. With a stiffer J2 or J3 the delay of the loop and the elastic cables leave no margin where there is no
@@ -35,6 +36,7 @@ const STIFF: Numbers = Numbers {
     moment_share: 1.0,
     force_window: periods(0.2) as usize,
     force_limit: (10.0, 1.0),
+    friction_speed: 0.01,
 };
 
 /// Soft in contact.
@@ -48,6 +50,8 @@ const COMPLIANT: Numbers = Numbers {
     moment_share: 0.4,
     force_window: periods(0.5) as usize,
     force_limit: (10.0, 1.0),
+    // Along a plan that bends, a steeper sign is a gain that swings an arm without friction.
+    friction_speed: 0.05,
 };
 
 /// Fraction of the model's Coulomb friction that is fed forward. Below 1, so that too large an estimate never drives.
@@ -98,6 +102,9 @@ pub struct Tracking<R: Real> {
     pub damping: Vector7<R>,
     /// Coulomb friction fed forward (N m).
     pub coulomb: Vector7<R>,
+    /// Planned speed at which half of the Coulomb friction is fed forward (rad/s): smooths the sign, so that a plan at
+    /// rest does not chatter.
+    pub friction_speed: R,
     /// Viscous friction fed forward (N m s/rad).
     pub viscous: Vector7<R>,
     /// Largest `|q_d - q|` per joint (rad): anti-windup of Eq (11).
@@ -194,6 +201,7 @@ impl<R: Real> Tracking<R> {
             stiffness: vector(numbers.stiffness),
             damping: vector(numbers.damping),
             coulomb: vector(wam7::FRICTION_COULOMB) * R::constant(FRICTION_FRACTION),
+            friction_speed: R::constant(numbers.friction_speed),
             viscous: vector(wam7::FRICTION_VISCOUS),
             clamp: vector(numbers.clamp),
             position: R::constant(numbers.pose),

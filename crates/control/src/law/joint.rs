@@ -13,10 +13,6 @@ use crate::real::Real;
 use crate::sense::joints::JointState;
 use crate::units::{JointTorques, JointVelocities, Vector7};
 
-/// Planned speed at which half of the Coulomb friction is fed forward (rad/s): smooths the sign, so that a plan at rest
-/// does not chatter.
-const FRICTION_SPEED: f64 = 0.01;
-
 /// Eq (10).
 #[derive(Clone, Debug)]
 pub struct JointController<R: Real> {
@@ -116,7 +112,7 @@ fn friction<R: Real>(gains: &Tracking<R>, dq_d: &JointVelocities<R>) -> Vector7<
     let mut torque = gains.viscous.component_mul(&dq_d.0);
     for ((torque, coulomb), rate) in torque.iter_mut().zip(gains.coulomb.iter()).zip(dq_d.0.iter()) {
         let magnitude = if *rate < R::constant(0.0) { -*rate } else { *rate };
-        *torque += *coulomb * *rate / (magnitude + R::constant(FRICTION_SPEED));
+        *torque += *coulomb * *rate / (magnitude + gains.friction_speed);
     }
     torque
 }

@@ -2,6 +2,7 @@
 //!
 //! Eq (11): `dq_d = J^+ (dx_d + K_x (x_d - x)) + K_post (I - J^+ J)(q_post - q)`, `J^+` damped. `q_d` is its integral,
 //! kept within a clamp of the measured `q` (anti-windup: blocked by contact, the integral would grow without bound).
+//! `x` and `q` are measured, or both those of `q_d`.
 //! `ddq_d` is
 //! `J^+ (ddx_d + K_x (dx_d - dx) - dJ dq) + (I - J^+ J) K_post (dq_post - dq)`, or the low-passed derivative of `dq_d`.
 //! The orientation error is `2 vec(q_d (x) conj(q))`, sign-aligned, in world axes, as the Jacobian's angular rows are.
@@ -94,8 +95,13 @@ impl<R: Real> OperationalController<R> {
             within_length(offset, R::constant(CORRECTION_SPEED.0) / gains.position),
             within_length(turn, R::constant(CORRECTION_SPEED.1) / gains.orientation),
         );
-        // The posture term uses the measured q in either case, so that the null space does not integrate blindly.
-        let preferred = (task.posture - state.q.0) * gains.posture;
+        // Of the plan where the pose is: against the measured posture of a joint that friction holds, q_d would be
+        // led on and on along the null space, and the springs of its joints, which are not alike, push the hand aside.
+        let posture = match feedback {
+            PoseFeedback::Measured => &state.q.0,
+            PoseFeedback::Planned => &self.q_d.0,
+        };
+        let preferred = (task.posture - posture) * gains.posture;
         let dq_d = inverse.resolve(&(task.velocity + correction), &preferred);
 
         // An error of the measured pose is closed against friction. Where the plan alone moves the joints, feedback
@@ -143,4 +149,59 @@ impl<R: Real> OperationalController<R> {
 fn within_length<R: Real>(vector: Vector3<R>, longest: R) -> Vector3<R> {
     let squared = vector.norm_squared();
     if squared <= longest * longest { vector } else { vector * (longest / sqrt(squared)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::law::gains::Gains;
+    use crate::model::calibration::Payload;
+    use crate::units::Vector7;
+
+    /// Farthest joint of `q_d` from the posture that a plan at rest prefers (rad), after ten seconds in which friction
+    /// holds J5 a tenth of a radian beside it.
+    fn led_away(feedback: PoseFeedback) -> f64 {
+        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+        let posture = JointPositions::from_array([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]);
+        let mut held = posture;
+        held.0[4] -= 0.1;
+        let task = TaskReference {
+            pose: Frames::new(&model, &posture).tool_pose(),
+            velocity: Vector6::zeros(),
+            acceleration: Vector6::zeros(),
+            posture: posture.0,
+            posture_velocity: Vector7::zeros(),
+        };
+        let state = JointState {
+            q: held,
+            dq: JointVelocities::zero(),
+            missing: 0,
+            extrapolated: 0,
+            age: 0,
+            implausible: false,
+            stuck: false,
+            still: 0,
+            displaced: false,
+        };
+        let (frames, gains) = (Frames::new(&model, &held), Gains::tuned().compliant);
+        let mut controller = OperationalController::new(posture);
+        for _ in 0..3000 {
+            controller.step(&model, &gains, &frames, &state, &task, (feedback, AccelerationSource::Analytic));
+        }
+        (controller.q_d().0 - posture.0).amax()
+    }
+
+    /// The change that makes it fail: the posture is the measured one in either case. 0.3 rad then, the clamp.
+    #[test]
+    fn a_joint_that_friction_holds_leads_the_planned_posture_nowhere() {
+        let away = led_away(PoseFeedback::Planned);
+        assert!(away < 1e-9, "{away} rad");
+    }
+
+    /// Measured, the sum takes away what friction leaves: a stiff run comes to its plan in all seven joints.
+    #[test]
+    fn against_a_joint_that_friction_holds_the_measured_posture_goes_on() {
+        let away = led_away(PoseFeedback::Measured);
+        assert!(away > 0.1, "{away} rad");
+    }
 }

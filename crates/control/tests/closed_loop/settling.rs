@@ -172,7 +172,8 @@ fn let_go_of(friction: f64, (joint, torque): (usize, f64), has_integral: bool) -
 }
 
 /// The integral is wound up by an unseen push, to its bound and no farther: the arm is drawn past its plan by what that
-/// bends its spring, and hardly faster than the spring alone draws it. J1 is not pushed harder: that stops the arm.
+/// bends its spring, less than 0.1 rad, and hardly faster than the spring alone draws it. J1 is not pushed harder: that
+/// stops the arm.
 ///
 /// The change that makes it fail: a bound of three times the friction.
 #[test]
@@ -182,7 +183,7 @@ fn a_compliant_arm_that_was_led_aside_by_its_elbow_is_not_thrown_when_it_is_let_
             let (with, without) = (let_go_of(friction, aside, true), let_go_of(friction, aside, false));
             println!("friction x{friction}, J{} by {} N m: {with:.3?}, without {without:.3?}", aside.0 + 1, aside.1);
             assert!(with.0 < without.0 + 0.12, "{with:?}, without {without:?}");
-            assert!(with.1 < without.1 + 0.07, "{with:?}, without {without:?}");
+            assert!(with.1 < 0.1, "{with:?}, without {without:?}");
         }
     }
 }

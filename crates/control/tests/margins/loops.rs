@@ -109,15 +109,15 @@ pub(crate) fn kick(
     law: Law,
     q: [f64; 7],
     variation: Variation,
-    bias: Vector3<f64>,
+    push: Vector3<f64>,
 ) -> Option<Rest> {
-    let kicked = course(gains, law, q, variation, bias, KICK)?;
-    let alone = course(gains, law, q, variation, bias, 0.0)?;
+    let kicked = course(gains, law, q, variation, push, KICK)?;
+    let alone = course(gains, law, q, variation, push, 0.0)?;
     Some(rest(&kicked.iter().zip(&alone).map(|(kicked, alone)| kicked - alone).collect::<Vec<_>>()))
 }
 
 /// An arm that has come to rest under this law; from now on what varies acts. `None`: a monitor stopped it before.
-fn settled(gains: &Gains<f64>, law: Law, q: [f64; 7], variation: Variation, bias: Vector3<f64>) -> Option<Loop> {
+fn settled(gains: &Gains<f64>, law: Law, q: [f64; 7], variation: Variation, push: Vector3<f64>) -> Option<Loop> {
     let q = at_limit(q, variation);
     // Rest comes first, with the nominal loop and time; then what varies is switched on.
     let plant = Plant::new(q, variation);
@@ -164,7 +164,7 @@ fn settled(gains: &Gains<f64>, law: Law, q: [f64; 7], variation: Variation, bias
                 ..RunOptions::default()
             }));
             arm.run_for(0.3);
-            arm.plant.bias = bias;
+            arm.plant.push = push;
             arm.run_for(3.0);
         }
     }
@@ -179,10 +179,10 @@ fn course(
     law: Law,
     q: [f64; 7],
     variation: Variation,
-    bias: Vector3<f64>,
+    push: Vector3<f64>,
     kick: f64,
 ) -> Option<Vec<Vector7<f64>>> {
-    let mut arm = settled(gains, law, q, variation, bias)?;
+    let mut arm = settled(gains, law, q, variation, push)?;
     if variation.pressed.is_some() {
         arm.run_for(PRESS);
     }

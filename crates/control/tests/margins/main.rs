@@ -34,9 +34,10 @@ const DRAWN: [(f64, f64); 7] =
 /// pressed four times as hard: no distance stops it.
 const PRESSED: [f64; 7] = [1.0, 1.0, 0.5, 0.5, 0.1, 0.1, 0.03];
 
-/// Bias of the force sensor in runs with Eq (8) or Eq (12) (N): beyond the dead band, which else hides their loops, and
-/// beyond what the tare follows in free motion.
-const BIAS: [f64; 3] = [0.8, 0.2, 0.0];
+/// Force that pushes the hand in runs with Eq (8) or Eq (12) (N): beyond the dead band, which else hides their loops,
+/// and beyond what the tare follows in free motion. Joints and sensor feel it: an error of the sensor alone is
+/// contradicted, and the arm stopped, before any loop is seen.
+const PUSH: [f64; 3] = [0.8, 0.2, 0.0];
 
 const fn run(compliant: bool, feedback: bool, force: bool) -> Law {
     Law::Run { compliant, feedback, force }
@@ -55,18 +56,45 @@ const LAWS: [(&str, Law); 10] = [
     ("run, compliant, Eqs 8, 12", run(true, true, true)),
 ];
 
-/// Loops that do not pass: the law, and the variations, "all" for all of them. One that passes has to leave the list.
+/// Loops that do not pass: the law, and the variations. One that passes has to leave the list.
 const OPEN: [(&str, &[&str]); 6] = [
     // The integral of the posture, too strong for half the stiffness: J7 swings at 4 Hz.
     ("approach", &["gain x0.5"]),
     // Nothing but gravity torque carries what the arm does not know of: it sinks, and a monitor stops it.
     ("teach", &["payload 1 kg"]),
     // Force control that presses on with the inertia of the hand, and of what it holds; and of the wall that holds on.
-    ("run, stiff, Eq 12", &["payload 1 kg", "gain x2", "3000 N/m y"]),
-    ("run, compliant, Eq 12", &["gain x2", "3000 N/m x", "3000 N/m y", "3000 N/m z"]),
-    // Friction is fed forward along the bent plan, with the large gain of its sign, where there is none.
-    ("run, compliant, Eq 8", &["all"]),
-    ("run, compliant, Eqs 8, 12", &["all"]),
+    ("run, stiff, Eq 12", &["payload 1 kg", "gain x1.4", "gain x2"]),
+    ("run, compliant, Eq 12", &["gain x2", "3000 N/m y", "3000 N/m z"]),
+    // A wall that holds on to a hand that gives way; and half of gravity's torque, or a kilogram nobody knows of, which
+    // a monitor finds once the hand has given way by a quarter of a metre.
+    (
+        "run, compliant, Eq 8",
+        &[
+            "gain x0.5",
+            "payload 1 kg",
+            "200 N/m x",
+            "200 N/m y",
+            "1000 N/m x",
+            "1000 N/m y",
+            "3000 N/m x",
+            "3000 N/m y",
+        ],
+    ),
+    (
+        "run, compliant, Eqs 8, 12",
+        &[
+            "gain x0.5",
+            "payload 1 kg",
+            "200 N/m x",
+            "200 N/m y",
+            "1000 N/m x",
+            "1000 N/m y",
+            "1000 N/m z",
+            "3000 N/m x",
+            "3000 N/m y",
+            "3000 N/m z",
+        ],
+    ),
 ];
 
 /// Loops that do not pass either at 500 Hz: the gains are those of 300 Hz, nobody tuned them for another rate. The
@@ -93,6 +121,18 @@ fn drawn() -> Option<u64> {
 /// True if what the wrist sensor measures acts on the arm.
 fn feels(law: Law) -> bool {
     matches!(law, Law::Run { feedback, force, .. } if feedback || force)
+}
+
+/// The forces under which a loop is kicked (N). A plan that bends gives way by a quarter of a metre: pushed out, the arm
+/// would end stretched, so it is pushed in.
+fn pushes(law: Law) -> Vec<Vector3<f64>> {
+    let (out, mut pushes) = (Vector3::from(PUSH), vec![Vector3::zeros()]);
+    match law {
+        Law::Run { feedback: true, .. } => pushes.push(Vector3::new(-out.x, out.y, out.z)),
+        Law::Run { force: true, .. } => pushes.extend([out, Vector3::new(-out.x, out.y, out.z)]),
+        _ => {}
+    }
+    pushes
 }
 
 fn variations(law: Law) -> Vec<(String, Variation)> {
@@ -131,11 +171,10 @@ fn variations(law: Law) -> Vec<(String, Variation)> {
 
 /// The worst pose of a law under a variation: what is left of the kick, and the words for it.
 fn worst(law: Law, variation: Variation) -> (f64, String) {
-    let biases = [Vector3::zeros(), Vector3::from(BIAS)];
     let mut worst = (-1.0, String::new());
     for (pose, q) in poses() {
-        for bias in &biases[..if feels(law) { 2 } else { 1 }] {
-            let (share, words) = match kick(&Gains::tuned(), law, q, variation, *bias) {
+        for push in pushes(law) {
+            let (share, words) = match kick(&Gains::tuned(), law, q, variation, push) {
                 Some(rest) => {
                     let words = format!("{:8.3}  J{} {:5.1} Hz  {pose}", rest.share, rest.joint, rest.frequency);
                     (rest.share, words)
@@ -171,8 +210,7 @@ fn every_loop_that_is_not_listed_is_stable_without_friction_and_every_listed_one
     println!("left of the kick, its joint and frequency, worst pose");
     for (law, (share, words), what) in rows {
         let fails = share > PASSED || share.is_nan();
-        let listed =
-            open.contains(&(law.to_owned(), what.clone())) || open.contains(&(law.to_owned(), "all".to_owned()));
+        let listed = open.contains(&(law.to_owned(), what.clone()));
         let mark = if fails { if listed { "open" } else { "FAILS" } } else { "" };
         println!("{law:26} {what:19} {words:32} {mark}");
         if fails != listed {

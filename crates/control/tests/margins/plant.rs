@@ -67,8 +67,8 @@ pub(crate) struct Plant {
     still: Option<Vector7<f64>>,
     /// Where the hand touches the wall (m).
     anchor: Option<Vector3<f64>>,
-    /// Force of which the sensor is wrong (N, world axes).
-    pub(crate) bias: Vector3<f64>,
+    /// Force that pushes the hand at the grasp point (N, world axes).
+    pub(crate) push: Vector3<f64>,
     calibration: Calibration<f64>,
 }
 
@@ -95,7 +95,7 @@ impl Plant {
             queue: (0..LATENCY + variation.delay).map(|_| gravity).collect(),
             still: None,
             anchor: None,
-            bias: Vector3::zeros(),
+            push: Vector3::zeros(),
             calibration: calibration.expect("scales"),
             variation,
         }
@@ -135,7 +135,7 @@ impl Plant {
     pub(crate) fn wrench(&self) -> RawWrench {
         let frames = self.frames();
         let gravity = Vector3::from(model::GRAVITY);
-        let (touch, held) = (self.wall(&frames), self.variation.payload);
+        let (touch, held) = (self.wall(&frames) + self.push, self.variation.payload);
         let acceleration = frames.jacobian().twist(&self.ddq);
         let at_tool: Vector3<f64> = acceleration.fixed_rows::<3>(0).into();
         let turning: Vector3<f64> = acceleration.fixed_rows::<3>(3).into();
@@ -145,7 +145,7 @@ impl Plant {
         let at_centre = at_tool + turning.cross(&(centre - tool));
         let hand = (gravity - at_centre) * model::HAND_MASS;
         let load = (gravity - at_tool) * held + touch;
-        let force = hand + load + self.bias;
+        let force = hand + load;
         let torque = centre.cross(&hand) + tool.cross(&load);
         let counts = |v: Vector3<f64>, scale: f64| [0, 1, 2].map(|axis| (v[axis] * scale).round() as i16);
         RawWrench { force: counts(to_sensor * force, 256.0), torque: counts(to_sensor * torque, 4096.0), status: None }
@@ -171,7 +171,8 @@ impl Plant {
                 + self.damping.component_mul(&(self.omega - self.dq));
             self.omega += (motor - cable).component_div(&self.rotors) * dt;
             self.theta += self.omega * dt;
-            let touch = if self.variation.wall.0 > 0.0 { self.wall(&self.frames()) } else { Vector3::zeros() };
+            let wall = if self.variation.wall.0 > 0.0 { self.wall(&self.frames()) } else { Vector3::zeros() };
+            let touch = wall + self.push;
             let mut external = jacobian.transpose_times(&Vector6::new(touch.x, touch.y, touch.z, 0.0, 0.0, 0.0));
             if let (Some((joint, torque)), true) = (self.variation.pressed, self.still.is_some()) {
                 external[joint] += torque;
