@@ -68,8 +68,12 @@ impl<P: CanPort> CanTransport<P> {
 }
 
 impl<P: CanPort> Transport for CanTransport<P> {
-    fn send(&mut self, mut bytes: &[u8]) -> Result<(), TransportError> {
-        while let Some(segment) = self.sender.cut(&mut bytes) {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
+        // The device hears all hosts of a bus in one sequence. Without a zero byte in front, what follows on the message
+        // of another is lost, and two who speak in turn silence each other, for ever if neither repeats anything.
+        let ended = [&[0], bytes].concat();
+        let mut rest = ended.as_slice();
+        while let Some(segment) = self.sender.cut(&mut rest) {
             // A segment always has an identifier of eleven bits and at most eight bytes.
             let frame = CanId::new(segment.id()).and_then(|id| CanFrame::new(id, segment.data()));
             self.port.send(frame.ok_or_else(|| TransportError::other("a segment is no CAN frame"))?)?;
