@@ -91,7 +91,7 @@ impl<A: LinkPort, B: LinkPort> LineSelector<A, B> {
             let mut bytes = portion.iter().take(count);
             if bytes.any(|byte| listener.hears(*byte)) {
                 // The line left behind may have been in the middle of a frame: the zero ends it, or this one would be
-                // taken for the rest of it, and both be lost. On a line that is never quiet no stop of another got through.
+                // taken for the rest of it, and both be lost. Beside a line that is never quiet no stop got through.
                 for byte in [0].iter().chain(listener.frame.iter()).chain(bytes) {
                     // All of it fits, nothing was left of an earlier one.
                     let _ = self.pending.push_back(*byte);

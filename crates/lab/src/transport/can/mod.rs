@@ -69,7 +69,7 @@ impl<P: CanPort> CanTransport<P> {
 
 impl<P: CanPort> Transport for CanTransport<P> {
     fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
-        // The device hears all hosts of a bus in one sequence. Without a zero byte in front, what follows on the message
+        // The device hears all hosts of a bus in one sequence. Without a zero byte in front, what follows on a message
         // of another is lost, and two who speak in turn silence each other, for ever if neither repeats anything.
         let ended = [&[0], bytes].concat();
         let mut rest = ended.as_slice();
