@@ -8,6 +8,7 @@ use firmware::board::LinkPort;
 use firmware::board::line::LineSelector;
 use link::Request;
 use link::frame::{Decoder, Envelope, FRAME_BYTES, encode};
+use link::message::{CHUNK_BYTES, ChunkData};
 
 /// A line with what a host put in and what the device sent.
 #[derive(Clone, Default)]
@@ -128,7 +129,8 @@ fn a_frame_that_comes_in_pieces_after_noise_is_handed_on_whole() {
         stream.extend(heard(&mut port));
     }
     assert_eq!(requests(&stream), [9]);
-    assert_eq!(stream, bytes, "nothing of the noise comes along");
+    let ended = [&[0][..], &bytes].concat();
+    assert_eq!(stream, ended, "what the other line had begun is ended, and nothing of the noise comes along");
 }
 
 #[test]
@@ -148,4 +150,55 @@ fn bytes_on_the_chosen_line_pass_untouched_even_if_they_are_no_frames() {
     wires[0].host_sends(&noise);
     assert_eq!(heard(&mut port), noise, "the session counts what it cannot read; the line must not hide it");
     assert_eq!(port.room(), 1000);
+}
+
+/// A part of an image, as an upload sends it without a pause.
+fn part(sequence: u16) -> Vec<u8> {
+    let mut bytes = [0; FRAME_BYTES];
+    let data = ChunkData::from_slice(&[0x5A; CHUNK_BYTES]).expect("it fits");
+    let envelope = Envelope { session: 7, sequence, time_ms: 0 };
+    let length = encode(envelope, &Request::UploadChunk { offset: 0, data }, &mut bytes).expect("it fits");
+    bytes[..length].to_vec()
+}
+
+#[test]
+fn a_stop_on_one_line_is_heard_wherever_in_a_frame_the_other_line_is() {
+    for upload in 0..3 {
+        for stop in (0..3).filter(|line| *line != upload) {
+            for cut in 1..part(1).len() {
+                let (wires, mut port) = three();
+                wires[upload].host_sends(&part(1));
+                let mut stream = heard(&mut port);
+                // The session comes by in the middle of a part of the upload; the stop is there, and then the rest.
+                let next = part(2);
+                wires[upload].host_sends(&next[..cut]);
+                stream.extend(heard(&mut port));
+                wires[stop].host_sends(&frame(100));
+                stream.extend(heard(&mut port));
+                wires[upload].host_sends(&next[cut..]);
+                wires[upload].host_sends(&part(3));
+                stream.extend(heard(&mut port));
+                stream.extend(heard(&mut port));
+                let found = requests(&stream);
+                assert!(found.contains(&100), "lines {upload} and {stop}, cut at {cut}: {found:?}");
+                assert!(found.contains(&3), "lines {upload} and {stop}, cut at {cut}: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn two_lines_that_speak_at_the_same_time_lose_no_frame_that_had_come_whole() {
+    for (first, second) in [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)] {
+        let (wires, mut port) = three();
+        wires[0].host_sends(&frame(1));
+        assert_eq!(requests(&heard(&mut port)), [1]);
+        // Longer than what the session takes at a time.
+        wires[first].host_sends(&part(2));
+        wires[second].host_sends(&part(3));
+        let stream: Vec<u8> = (0..4).flat_map(|_| heard(&mut port)).collect();
+        let mut found = requests(&stream);
+        found.sort_unstable();
+        assert_eq!(found, [2, 3], "lines {first} and {second}");
+    }
 }

@@ -189,7 +189,7 @@ fn said_by_another(sender: &mut Segmenter, sequence: u16, request: &Request) -> 
     let mut buffer = [0; FRAME_BYTES];
     let envelope = Envelope { session: 999, sequence, time_ms: 0 };
     let length = frame::encode(envelope, request, &mut buffer).unwrap();
-    // A host begins with a zero byte, and so does every repetition.
+    // Every message of a host on a bus begins with a zero byte.
     let message = [&[0], &buffer[..length]].concat();
     let mut bytes = message.as_slice();
     let segments = std::iter::from_fn(|| sender.cut(&mut bytes));
@@ -222,6 +222,29 @@ fn a_second_host_on_the_bus_stops_the_arm_whatever_the_place_of_its_segments() {
         client.request(&Request::Ping).unwrap();
     }
     assert_eq!(stopped, 16);
+}
+
+/// Both say something every 100 ms, in turn: after each message of the one the next is the other's.
+#[test]
+fn a_host_that_looks_on_over_the_bus_does_not_silence_the_one_that_commands() {
+    let mut client = arm("sil:world=simple,line=can");
+    procedure::make_ready(&mut client, false, |_| {}).unwrap();
+    for place in 0..16 {
+        let mut other = Segmenter::new(Direction::ToDevice, DeviceNumber::FIRST);
+        for _ in 0..place {
+            other.cut(&mut &[1_u8][..]);
+        }
+        client.hold().unwrap();
+        client.gravity().unwrap();
+        for turn in 0..10 {
+            client.next(Duration::from_millis(110)).unwrap_or_else(|error| panic!("place {place}, {turn}: {error}"));
+            let Device::SimulatedCan(line) = client.transport() else { panic!("a CAN line was asked for") };
+            for frame in said_by_another(&mut other, turn, &Request::Ping) {
+                line.port().send(frame).unwrap();
+            }
+        }
+        assert_eq!(client.status().unwrap().state, State::Gravity.code(), "place {place}: the arm was stopped");
+    }
 }
 
 #[test]

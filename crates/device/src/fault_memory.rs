@@ -21,8 +21,9 @@ pub const FAULT_CYCLES: usize = control::RATE_HZ as usize;
 const CYCLE_WORDS: usize = 2 + size_of::<ShortTelemetry>() / 4 + 1;
 /// Magic number, content, check sum.
 const HEAD_WORDS: usize = 10;
-/// "TaF2" and the schema of the link: a program with another telemetry does not read the cycles of this one.
-const MAGIC: u32 = u32::from_le_bytes(*b"TaF2") ^ link::SCHEMA_HASH;
+/// "TaF3" and the schema of the link: a program with another telemetry does not read the cycles of this one, nor does
+/// one that rounds them in other steps.
+const MAGIC: u32 = u32::from_le_bytes(*b"TaF3") ^ link::SCHEMA_HASH;
 
 type Cycle = [u32; CYCLE_WORDS];
 

@@ -47,7 +47,7 @@ pub struct Telemetry {
 /// Steps per unit of each run of `Telemetry::values`, with its length. More than 32767 steps become as many.
 const STEPS: [(usize, f32); 12] = [
     (1, 30_000.0), // phase
-    (7, 8000.0),   // q: 0.125 mrad
+    (7, 6250.0),   // q: 0.16 mrad, up to 5.24 rad: J5 stands at -4.76 when it is at its stop
     (7, 1000.0),   // dq: 1 mrad/s
     (7, 250.0),    // tau: 4 mN m
     (3, 10_000.0), // pose_d: 0.1 mm

@@ -4,6 +4,7 @@
 //! all the time. Bytes on the chosen line pass through untouched. On the others a [`Listener`] waits for a whole frame
 //! whose check sum is right; then that line is chosen, its frame is handed on, and what is sent goes there from then
 //! on. Noise on a line that nobody uses, an open input or another program's chatter never takes the conversation away.
+//! What the line left behind had begun is ended by a zero byte: it will not come to its end here.
 //!
 //! The session decides if a new host may take over from the old one, not the line: it refuses a second
 //! host while the first is heard, and the refusal goes back on the line the request came from.
@@ -58,8 +59,8 @@ pub struct LineSelector<A, B> {
     pending: heapless::Deque<u8, PENDING_BYTES>,
 }
 
-/// Bytes of a frame and the portion behind it.
-const PENDING_BYTES: usize = FRAME_BYTES + PORTION;
+/// Bytes of the end of another frame, of a frame, and of the portion behind it.
+const PENDING_BYTES: usize = 1 + FRAME_BYTES + PORTION;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Chosen {
@@ -89,9 +90,10 @@ impl<A: LinkPort, B: LinkPort> LineSelector<A, B> {
             };
             let mut bytes = portion.iter().take(count);
             if bytes.any(|byte| listener.hears(*byte)) {
-                self.pending.clear();
-                for byte in listener.frame.iter().chain(bytes) {
-                    // A frame and a portion fit.
+                // The line left behind may have been in the middle of a frame: the zero ends it, or this one would be
+                // taken for the rest of it, and both be lost. Beside a line that is never quiet no stop got through.
+                for byte in [0].iter().chain(listener.frame.iter()).chain(bytes) {
+                    // All of it fits, nothing was left of an earlier one.
                     let _ = self.pending.push_back(*byte);
                 }
                 listener.reset();
@@ -113,7 +115,10 @@ const LISTEN_ROUNDS: usize = 32;
 
 impl<A: LinkPort, B: LinkPort> LinkPort for LineSelector<A, B> {
     fn read(&mut self, buffer: &mut [u8]) -> usize {
-        self.listen();
+        // Not before all of the frame by which this line was chosen is handed on: another one would cut it off.
+        if self.pending.is_empty() {
+            self.listen();
+        }
         let mut count = 0;
         for place in buffer.iter_mut() {
             let Some(byte) = self.pending.pop_front() else { break };

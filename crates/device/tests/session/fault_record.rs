@@ -65,6 +65,22 @@ fn a_record_ends_with_the_cycle_of_the_fault_and_stays_until_the_next_one() {
 }
 
 #[test]
+fn a_record_tells_every_posture_of_the_arm_from_stop_to_stop() {
+    use control::model::{POSITION_MAX, POSITION_MIN};
+    for stops in [POSITION_MIN, POSITION_MAX] {
+        let mut rig = Rig::greeted();
+        let q = stops.map(|angle| angle as f32);
+        let record =
+            CycleRecord { cycle: 1, state: State::SoftStop, fault: Fault::JointLimit, q, ..CycleRecord::EMPTY };
+        rig.bench.records.push_back(TimedRecord { record, cost_ticks: 0 });
+        rig.poll();
+        let told = cycle(&mut rig, 1, 0).expect("a whole cycle").q;
+        let off = told.iter().zip(q).map(|(told, angle)| (told - angle).abs()).fold(0.0, f32::max);
+        assert!(off <= 0.08e-3 + 1e-6, "{told:?} instead of {q:?}");
+    }
+}
+
+#[test]
 fn an_observer_reads_the_record_too() {
     let mut rig = Rig::greeted();
     run(&mut rig, 0..10, Fault::None);

@@ -404,8 +404,8 @@ impl<T: Transport> Client<T> {
         Ok(self.transport.send(&[head, &buffer[..length]].concat())?)
     }
 
-    /// As [`Client::send`], after a zero byte: on a bus where another host speaks to the same device, a message is
-    /// lost where the two alternate, unless such a byte ends what came before.
+    /// As [`Client::send`], after a zero byte: half a message may stand on the line, and one that follows is lost with
+    /// it.
     fn send_again(&mut self, envelope: Envelope, request: &Request) -> Result<(), HostError> {
         self.send_behind(&[0], envelope, request)
     }
