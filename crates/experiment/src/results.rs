@@ -1,6 +1,6 @@
 //! Results: one report a trial, written as it comes, and read back when an experiment is resumed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -88,6 +88,14 @@ pub struct Report {
     /// Time it took on this machine, s; only in `results.jsonl`, because it differs from run to run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wall_s: Option<f64>,
+}
+
+impl Report {
+    /// True if the arm stopped by itself, for its shaking or another fault: what it did not do any more is no merit.
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        self.outcome.is_stopped() || self.measures.stopped
+    }
 }
 
 /// First line of the file of reports: what the trials belong to.
@@ -285,6 +293,12 @@ impl Results {
         seeds.sort_unstable();
         seeds.dedup();
         seeds
+    }
+
+    /// Number of the cells that were tried, in this mode or in any.
+    pub fn cells(&self, mode: Option<Mode>) -> usize {
+        let reports = self.reports.iter().filter(|report| mode.is_none_or(|mode| report.key.mode == mode));
+        reports.map(|report| report.key.index).collect::<BTreeSet<_>>().len()
     }
 
     /// Cells in which a mode succeeded, in the mean over the seeds.

@@ -20,7 +20,7 @@ pub fn draw(results: &Results, title: &str, tipping: Option<f64>) -> Drawing {
         .iter()
         .map(|mode| {
             // What an arm that stopped did not do any more is not gentle: it has no force that could be counted.
-            let went_on = results.of(*mode).filter(|report| !report.outcome.is_stopped());
+            let went_on = results.of(*mode).filter(|report| !report.is_stopped());
             went_on.map(|report| report.measures.contact_sustained_n).collect()
         })
         .collect();
