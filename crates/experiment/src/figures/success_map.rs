@@ -44,7 +44,7 @@ pub fn draw(results: &Results, grid: &Grid, title: &str, radius: f64) -> Drawing
     let seeds = results.seeds().len();
     let tried = format!(
         "{} positions, {} modes, {seeds} {}",
-        grid.cells.len(),
+        results.cells(None),
         results.modes().len(),
         if seeds == 1 { "seed" } else { "seeds" }
     );
@@ -62,7 +62,7 @@ pub fn draw(results: &Results, grid: &Grid, title: &str, radius: f64) -> Drawing
     goal(&mut drawing, &frame, radius);
     let arrow = frame.at([frame.x[0], 0.0]);
     drawing.arrow([arrow[0] - 112.0, arrow[1]], [arrow[0] - 62.0, arrow[1]], INK, 4.0);
-    legend(&mut drawing, results, grid, [frame.right() + 44.0, TOP + 6.0]);
+    legend(&mut drawing, results, [frame.right() + 44.0, TOP + 6.0]);
     drawing
 }
 
@@ -84,23 +84,26 @@ fn apart(grid: &Grid) -> f64 {
     f64::from(pairs.min().unwrap_or(LARGEST).min(LARGEST))
 }
 
-/// Shares of a cell by the simplest mode that holds there, and what is left; nothing of a cell that was not tried.
+/// Shares of a cell by the simplest mode that holds there, seed by seed, and what no mode holds; nothing of a cell that
+/// was not tried.
 fn parts(results: &Results, index: usize) -> Vec<(f64, Colour)> {
-    let mut parts = Vec::new();
-    let mut done = 0.0;
-    let mut is_tried = false;
-    for mode in results.modes() {
-        let Some(share) = results.success_share(mode, index) else { continue };
-        is_tried = true;
-        if share > done + 1e-9 {
-            parts.push((share - done, colour(mode)));
-            done = share;
-        }
-    }
-    if is_tried && done < 1.0 - 1e-9 {
-        parts.push((1.0 - done, PALE));
-    }
-    parts
+    let held = |mode: Mode, seed: u64| {
+        let mut reports = results.of(mode).filter(|report| (report.key.index, report.key.seed) == (index, seed));
+        reports.next().map(|report| report.outcome.is_success())
+    };
+    let modes = results.modes();
+    // Of each seed with which it was tried, the simplest mode that held.
+    let simplest: Vec<Option<Mode>> = results
+        .seeds()
+        .into_iter()
+        .filter(|&seed| modes.iter().any(|&mode| held(mode, seed).is_some()))
+        .map(|seed| modes.iter().copied().find(|&mode| held(mode, seed) == Some(true)))
+        .collect();
+    let share = |of: Option<Mode>| {
+        let count = simplest.iter().filter(|mode| **mode == of).count();
+        (count > 0).then(|| (count as f64 / simplest.len() as f64, of.map_or(PALE, colour)))
+    };
+    modes.iter().copied().map(Some).chain([None]).filter_map(share).collect()
 }
 
 /// Values with their places, without those that stand less than `room` px behind the one before.
@@ -136,7 +139,7 @@ fn goal(drawing: &mut Drawing, frame: &Frame, radius: f64) {
     drawing.circle(at, 4.0, Some(INK), None);
 }
 
-fn legend(drawing: &mut Drawing, results: &Results, grid: &Grid, [x, top]: [f64; 2]) {
+fn legend(drawing: &mut Drawing, results: &Results, [x, top]: [f64; 2]) {
     let text = x + 40.0;
     let mut y = top;
     drawing.text([x, y + 16.0], "held after lifting by 10 cm for 2 s", 17, Anchor::Start, INK);
@@ -151,7 +154,7 @@ fn legend(drawing: &mut Drawing, results: &Results, grid: &Grid, [x, top]: [f64;
             (Mode::RigidFingers, _) => "only if the fingers do not adapt",
         };
         drawing.text([text, y + 13.0], words, 16, Anchor::Start, INK);
-        let count = format!("this mode: {} of {}", short(results.success_count(mode)), grid.cells.len());
+        let count = format!("this mode: {} of {}", short(results.success_count(mode)), results.cells(Some(mode)));
         drawing.text([text, y + 32.0], count, 15, Anchor::Start, GREY);
         y += 54.0;
     }
@@ -192,6 +195,22 @@ mod tests {
         }
         assert_eq!(parts(&results, 7), [(1.0, PALE)]);
         assert_eq!(parts(&results, 999), [], "nobody tried it: it is not shown as one that failed");
+    }
+
+    /// The change that makes it fail: the shares of the modes, which are not those of the seeds they belong to.
+    #[test]
+    fn a_cell_that_one_mode_or_another_held_with_every_seed_is_not_in_no_mode() {
+        let mut results = fixtures::results(&[1, 2, 3, 4]);
+        for report in results.reports.iter_mut().filter(|report| report.key.index == 5) {
+            let held = match report.key.mode {
+                Mode::OpenLoop => report.key.seed == 1,
+                Mode::Adaptive => report.key.seed == 2 || report.key.seed == 3,
+                _ => false,
+            };
+            report.outcome = if held { Outcome::Held } else { Outcome::Missed };
+        }
+        let expected = [(0.25, colour(Mode::OpenLoop)), (0.5, colour(Mode::Adaptive)), (0.25, PALE)];
+        assert_eq!(parts(&results, 5), expected);
     }
 
     /// An attribute of every element of a kind, and the text in it.
