@@ -74,7 +74,8 @@ pub struct Cmd {
     /// Go on with the results in the folder
     #[arg(long)]
     pub resume: bool,
-    /// Make figures and tables of the results in the folder, without trials
+    /// Make figures and tables of the results in the folder, without trials: of all modes and seeds that are there,
+    /// unless some are named
     #[arg(long, conflicts_with = "resume")]
     pub figures_only: bool,
     /// Render frames of one trial in each mode
@@ -210,7 +211,8 @@ mod work {
         Ok(Config {
             object: object.unwrap_or(usual.object),
             grid: grid.moved(command.rotate, command.shift.map(|value| value * 0.01)),
-            modes: modes(command).unwrap_or(usual.modes),
+            // Figures are of everything that is there, unless a part of it is named.
+            modes: modes(command).unwrap_or(if command.figures_only { Vec::new() } else { usual.modes }),
             seeds: seeds(command),
             engine,
             plant: command.plant,
@@ -271,6 +273,7 @@ mod work {
         match (command.seed, &command.seeds) {
             (Some(seed), _) => vec![seed],
             (None, Some(seeds)) => seeds.clone().collect(),
+            (None, None) if command.figures_only => Vec::new(),
             (None, None) => vec![1],
         }
     }
@@ -341,6 +344,9 @@ mod work {
                 bar.set_position(done as u64);
                 bar.reset_eta();
             }
+            Progress::Unfinished { all, done, counted } => output.warn(format!(
+                "{done} of {all} trials are there: the figures are of the {counted} whose arms or cells are through"
+            )),
             Progress::Done(report) => {
                 bar.inc(1);
                 let key = &report.key;
@@ -380,7 +386,8 @@ mod work {
             texts.push(text);
         }
         let file = out.join("figures");
-        figures::write_lift(&rows, config.grid.cells.len() * config.seeds.len(), &file)
+        let trials = rows.iter().map(|row| row.trials).max().unwrap_or(0);
+        figures::write_lift(&rows, trials, &file)
             .map_err(|cause| Failure::new(ErrorCode::ExperimentFigure, "experiment: a figure cannot be made", cause))?;
         output.say(format!("wrote {}", file.join("sag.png").display()));
         let text = lift::table(&rows);
