@@ -156,6 +156,7 @@ mod work {
     use experiment::calibrated::{Calibrated, CalibrationError};
     use experiment::lift::{self, Case};
     use experiment::preparation::{self, PreparationError, Teaching};
+    use experiment::results::Log;
     use experiment::sweep::{self, Point};
     use experiment::trial::TrialError;
     use experiment::{Comparison, Config, Experiment, ExperimentError, Progress, Scenario, figures, map};
@@ -439,7 +440,15 @@ mod work {
         }
         if file.is_file() {
             output.say(format!("the primitive is {}", file.display()));
-            return upload::read(&file, DOING);
+            let primitive = upload::read(&file, DOING)?;
+            if primitive.statistics.is_some() || command.figures_only || Log::is_begun(out) {
+                return Ok(primitive);
+            }
+            // Somebody broke off while they were gathered. Without them nothing watches the trials, and none is told.
+            let spinner = output.spinner("recording successful runs");
+            let watched = with_statistics(command, primitive, &file, interrupt, output);
+            spinner.finish_and_clear();
+            return watched.map_err(preparation_failure);
         }
         if command.figures_only {
             let cause = format!("{} is not there", file.display());
@@ -454,19 +463,35 @@ mod work {
         let made = preparation::make(teaching, &file, jobs, interrupt, &mut |doing| {
             spinner.set_message(doing.to_owned());
         })
-        .and_then(|mut primitive| {
+        .and_then(|primitive| {
             // Whatever becomes of the statistics, the primitive is worth keeping.
             primitive.write(&file)?;
             spinner.set_message("recording successful runs");
-            let config = Config { plant: command.plant, ..Config::new(command.scenario, primitive.clone()) };
-            let (held, of) = preparation::statistics(&config, interrupt, &mut primitive)?;
-            output.say(format!("{held} of {of} runs succeeded; what is usual was learned from them"));
-            primitive.write(&file)?;
-            Ok(primitive)
+            with_statistics(command, primitive, &file, interrupt, output)
         });
         spinner.finish_and_clear();
         let primitive = made.map_err(preparation_failure)?;
         output.say(format!("taught, learned and rehearsed: {}", file.display()));
+        Ok(primitive)
+    }
+
+    /// The primitive with the statistics of successful runs, written into its file.
+    fn with_statistics(
+        command: &Cmd,
+        mut primitive: PrimitiveFile,
+        file: &Path,
+        interrupt: &Interrupt,
+        output: Output,
+    ) -> Result<PrimitiveFile, PreparationError> {
+        let usual = Config::new(command.scenario, primitive.clone());
+        let jobs = command.jobs.map_or(usual.jobs, usize::from);
+        let config = Config { plant: command.plant, jobs, ..usual };
+        let (held, of) = preparation::statistics(&config, interrupt, &mut primitive)?;
+        output.say(match primitive.statistics {
+            Some(_) => format!("{held} of {of} runs succeeded; what is usual was learned from them"),
+            None => format!("{held} of {of} runs succeeded: too few to learn what is usual, and nothing is watched"),
+        });
+        primitive.write(file)?;
         Ok(primitive)
     }
 
