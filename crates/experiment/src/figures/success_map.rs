@@ -41,12 +41,12 @@ pub fn draw(results: &Results, grid: &Grid, title: &str, radius: f64) -> Drawing
     let frame = Frame { corner: [LEFT, TOP], size, x, y };
     let mut drawing = Drawing::new(LEFT + size[0] + LEGEND, (TOP + size[1] + 90.0).max(TOP + 350.0));
     drawing.text([LEFT, 48.0], title, 26, Anchor::Start, INK);
-    let seeds = results.seeds().len();
+    let several = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
     let tried = format!(
-        "{} positions, {} modes, {seeds} {}",
-        results.cells(None),
-        results.modes().len(),
-        if seeds == 1 { "seed" } else { "seeds" }
+        "{}, {}, {}",
+        several(results.cells(None), "position"),
+        several(results.modes().len(), "mode"),
+        several(results.seeds().len(), "seed")
     );
     drawing.text([LEFT, 78.0], tried, 16, Anchor::Start, GREY);
     for (index, cell) in grid.cells.iter().enumerate() {
@@ -144,14 +144,20 @@ fn legend(drawing: &mut Drawing, results: &Results, [x, top]: [f64; 2]) {
     let mut y = top;
     drawing.text([x, y + 16.0], "held after lifting by 10 cm for 2 s", 17, Anchor::Start, INK);
     y += 38.0;
-    for (rank, mode) in results.modes().into_iter().enumerate() {
+    // Where one mode alone was tried nobody knows what the others do.
+    let modes = results.modes();
+    let is_alone = modes.len() == 1;
+    for mode in modes {
         drawing.rectangle([x, y], [28.0, 28.0], colour(mode));
-        let words = match (mode, rank) {
-            (Mode::Track, _) => "with stiff position control",
-            (Mode::OpenLoop, _) => "already in open loop",
-            (Mode::ForceControl, _) => "with force control",
-            (Mode::Adaptive, _) => "only with adaptation of the movement",
-            (Mode::RigidFingers, _) => "only if the fingers do not adapt",
+        let words = match mode {
+            Mode::Track => "with stiff position control",
+            Mode::OpenLoop if is_alone => "in open loop",
+            Mode::OpenLoop => "already in open loop",
+            Mode::ForceControl => "with force control",
+            Mode::Adaptive if is_alone => "with adaptation of the movement",
+            Mode::Adaptive => "only with adaptation of the movement",
+            Mode::RigidFingers if is_alone => "if the fingers do not adapt",
+            Mode::RigidFingers => "only if the fingers do not adapt",
         };
         drawing.text([text, y + 13.0], words, 16, Anchor::Start, INK);
         let count = format!("this mode: {} of {}", short(results.success_count(mode)), results.cells(Some(mode)));
@@ -159,7 +165,8 @@ fn legend(drawing: &mut Drawing, results: &Results, [x, top]: [f64; 2]) {
         y += 54.0;
     }
     drawing.rectangle([x, y], [28.0, 28.0], PALE);
-    drawing.text([text, y + 19.0], "in no mode", 16, Anchor::Start, INK);
+    let none = if is_alone { "not held" } else { "in no mode" };
+    drawing.text([text, y + 19.0], none, 16, Anchor::Start, INK);
     y += 50.0;
     drawing.circle([x + 14.0, y + 8.0], 14.0, None, Some((INK, 2.2)));
     drawing.circle([x + 14.0, y + 8.0], 3.5, Some(INK), None);
@@ -195,6 +202,19 @@ mod tests {
         }
         assert_eq!(parts(&results, 7), [(1.0, PALE)]);
         assert_eq!(parts(&results, 999), [], "nobody tried it: it is not shown as one that failed");
+    }
+
+    /// The change that makes it fail: one legend, whatever was tried.
+    #[test]
+    fn of_one_mode_alone_nothing_is_said_of_the_others() {
+        let mut results = fixtures::results(&[1]);
+        results.reports.retain(|report| report.key.mode == Mode::Adaptive);
+        let svg = draw(&results, &Grid::paper(), "Torch", 0.03).to_svg();
+        assert!(
+            !svg.contains("only with") && svg.contains(">with adaptation of the movement<"),
+            "nobody tried without"
+        );
+        assert!(svg.contains(">not held<") && !svg.contains("in no mode") && svg.contains("1 mode, 1 seed"));
     }
 
     /// The change that makes it fail: the shares of the modes, which are not those of the seeds they belong to.
