@@ -114,6 +114,27 @@ fn fingers_out_of_their_range_are_put_right_where_they_came_from() {
     assert!(code == "E631" && help.contains("`--hand-goal`") && !help.contains("show the movement"), "{help}");
 }
 
+/// The change that makes it fail: every refusal is answered with a movement farther from the limits.
+#[test]
+fn a_movement_whose_slow_end_was_cut_off_is_put_right_by_what_the_check_advises() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut text = "t_s,q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,q7_rad\n".to_owned();
+    for line in 0..=1480 {
+        let time = f64::from(line) / 25.0;
+        let r = ((time - 0.5) / 58.5).clamp(0.0, 1.0);
+        let turned = 0.5 * r.powi(3) * (10.0 - 15.0 * r + 6.0 * r * r);
+        text += &format!("{time},{:.7},1.089,0.505,1.737,-0.753,-1.034,-0.061\n", turned - 0.416);
+    }
+    std::fs::write(at.join("slow.csv"), text).unwrap();
+    succeeds(at, "learn slow.csv");
+    let (code, help) = refused(at, "check slow.toml");
+    assert_eq!(code, "E631");
+    assert!(help.contains("`--still-speed 0.001`") && !help.contains("limits"), "{help}");
+    succeeds(at, "learn slow.csv --still-speed 0.001 --force");
+    succeeds(at, "check slow.toml");
+}
+
 #[test]
 fn a_refused_run_advises_a_check_that_shows_the_same() {
     let folder = tempfile::tempdir().unwrap();

@@ -51,6 +51,35 @@ fn a_report_is_written_once_and_replaced_only_when_told_to() {
     assert!(!folder.join("other.html").exists());
 }
 
+/// The change that makes it fail: a recording of two runs is looked at without a word.
+#[test]
+fn who_looks_at_a_recording_of_two_runs_is_told_that_the_last_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut rows = common::rows(3.0);
+    for row in &mut rows {
+        let run = [0.5..1.5, 2.5..3.5].iter().any(|played| played.contains(&row.time));
+        row.telemetry.state = if run { control::State::Run } else { control::State::Hold }.code();
+    }
+    std::fs::write(folder.join("two.csv"), common::text(&rows)).unwrap();
+    let commands: [&[&str]; 3] = [
+        &["report", "two.csv", "-o", "page.html"],
+        &["compare", "two.csv", "two.csv"],
+        &["plot", "--run", "two.csv", "-o", "figure.svg"],
+    ];
+    for command in commands {
+        let told = tactus(folder, command).success();
+        assert!(
+            stderr(&told).contains("two.csv holds 2 runs: the last one is taken"),
+            "{command:?}: {}",
+            stderr(&told)
+        );
+    }
+    let compared: serde_json::Value =
+        serde_json::from_str(&stdout(&tactus(folder, &["--json", "compare", "two.csv", "two.csv"]).success())).unwrap();
+    assert_eq!(compared["whole"]["samples"], 300);
+}
+
 #[test]
 fn cli_2_codes_and_faults_are_explained_without_a_device() {
     let folder = tempfile::tempdir().unwrap();

@@ -109,7 +109,7 @@ impl Comparison {
         }
         let compared = pairs.len();
         let share = |count: usize| count as f64 / compared as f64;
-        let pairs: Vec<_> = pairs.into_iter().filter(|(_, adapted)| !adapted.outcome.is_stopped()).collect();
+        let pairs: Vec<_> = pairs.into_iter().filter(|(_, adapted)| !adapted.is_stopped()).collect();
         let ratio = |quantity: &Quantity, (open, adapted): &(&Report, &Report)| {
             (quantity.value)(&adapted.measures) / (quantity.value)(&open.measures).max(f64::MIN_POSITIVE)
         };
@@ -188,6 +188,18 @@ mod tests {
     use super::*;
     use crate::fixtures;
     use crate::outcome::Outcome;
+
+    /// The change that makes it fail: only an outcome `stopped` is one.
+    #[test]
+    fn an_arm_that_its_shaking_stopped_is_above_every_bar() {
+        let mut results = fixtures::results(&[1]);
+        for report in results.reports.iter_mut().filter(|report| report.key.mode == Mode::Adaptive) {
+            report.outcome = Outcome::Unstable;
+            report.measures = Measures { stopped: true, ..Measures::default() };
+        }
+        let comparison = Comparison::of(&results, Scenario::Cup).unwrap();
+        assert_eq!((comparison.stopped, comparison.all_below), (comparison.pairs, 0.0));
+    }
 
     #[test]
     fn what_open_loop_does_not_meet_is_left_out_and_said_so() {

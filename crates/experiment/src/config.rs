@@ -7,7 +7,7 @@ use sim::world::mujoco::{ObjectKind, ObjectSpec, TABLE_TOP};
 
 use super::grid::{ApproachFrame, Cell, Grid};
 use super::outcome::Rule;
-use super::results::{CODE, Header, Key};
+use super::results::{CODE, Header, Key, Results};
 use super::scenario::{PlantKind, Scenario};
 use super::seed;
 use super::variation::Variation;
@@ -31,7 +31,8 @@ pub struct Config {
     pub object: ObjectKind,
     /// Where.
     pub grid: Grid,
-    /// The modes in which the primitive is played.
+    /// The modes in which the primitive is played. None, and no seed: those of the results that are there, for their
+    /// figures ([`Config::as_it_is`]).
     pub modes: Vec<Mode>,
     /// With which seeds.
     pub seeds: Vec<u64>,
@@ -91,6 +92,19 @@ impl Config {
             cells().flat_map(move |(index, cell)| self.modes.iter().map(move |&mode| Key { index, cell, mode, seed }))
         };
         self.seeds.iter().flat_map(|&seed| trial(seed)).collect()
+    }
+
+    /// The same with the modes and seeds of these results where it names none.
+    #[must_use]
+    pub fn of_what_is_there(&self, results: &Results) -> Config {
+        let mut config = self.clone();
+        if config.modes.is_empty() {
+            config.modes = results.modes();
+        }
+        if config.seeds.is_empty() {
+            config.seeds = results.seeds();
+        }
+        config
     }
 
     /// The frame of the approach: its goal is where the primitive ends (where its fingers close, for one that lifts),
@@ -214,7 +228,27 @@ fn firmware(image: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{ObjectKind, described};
+    use std::path::Path;
+
+    use lab::demonstration::Recording;
+    use lab::learn::{LearnOptions, learn};
+
+    use super::{Config, Mode, ObjectKind, Scenario, described};
+    use crate::fixtures;
+
+    /// The change that makes it fail: an empty list means nothing, and not everything.
+    #[test]
+    fn figures_are_of_every_mode_and_arm_that_is_there_unless_some_are_named() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/reach.csv");
+        let recording = Recording::read(&file).unwrap();
+        let primitive = learn(&recording, Path::new("reach.toml"), &LearnOptions::named("reach")).unwrap().primitive;
+        let results = fixtures::results(&[3, 5]);
+        let named = Config { seeds: vec![5], modes: Vec::new(), ..Config::new(Scenario::Flashlight, primitive) };
+        let config = named.of_what_is_there(&results);
+        assert_eq!((config.modes, config.seeds), (Mode::PAPER.to_vec(), vec![5]));
+        let all = Config { seeds: Vec::new(), ..named }.of_what_is_there(&results);
+        assert_eq!(all.seeds, [3, 5]);
+    }
 
     /// The change that makes it fail: the name alone, by which `--resume` would mix two objects.
     #[test]

@@ -69,6 +69,7 @@ pub fn results(seeds: &[u64]) -> Results {
                         finger_asked_n: 8.0,
                         chatter_n: Some(0.2),
                         shaking_rad_s: 0.02,
+                        stopped: false,
                     },
                     adaptation_m: share * cell.distance(),
                     adaptation_deg: share * 80.0 * cell.distance(),

@@ -45,6 +45,7 @@ pub mod trace;
 #[cfg(feature = "mujoco")]
 pub mod trial;
 pub mod variation;
+mod whole;
 
 pub use comparison::Comparison;
 #[cfg(feature = "mujoco")]

@@ -84,7 +84,7 @@ pub fn carried(case: Case, results: &Results, mass: f64) -> Vec<Carried> {
     let [remembered_kg, carried_kg] = case.factors().map(|factor| factor * usual);
     let of_mode = |mode| {
         // An arm that stopped has lifted nothing; earlier versions wrote a sag of 0 for it.
-        let went_on = results.of(mode).filter(|report| !report.outcome.is_stopped());
+        let went_on = results.of(mode).filter(|report| !report.is_stopped());
         let sags: Vec<f64> = went_on.filter_map(|report| report.sag_m).collect();
         let free: Vec<f64> = results.of(mode).filter_map(|report| report.free_sag_m).map(f64::abs).collect();
         Carried {

@@ -27,7 +27,7 @@ pub fn draw(results: &Results, grid: &Grid) -> String {
     );
     text.push_str("        ");
     for mode in &modes {
-        let heading = format!("({mode}) {}/{}", short(results.success_count(*mode)), grid.cells.len());
+        let heading = format!("({mode}) {}/{}", short(results.success_count(*mode)), results.cells(Some(*mode)));
         text.push_str(&format!("{heading:width$}{GAP}"));
     }
     finish_line(&mut text);

@@ -158,6 +158,9 @@ pub struct Measures {
     /// Largest [amplitude](crate::shaking::amplitude) of a joint's speed above 15 Hz, rad/s.
     #[serde(default)]
     pub shaking_rad_s: f64,
+    /// True if a fault stopped the arm, that of an arm that shakes included.
+    #[serde(default)]
+    pub stopped: bool,
 }
 
 impl Measures {
@@ -287,6 +290,7 @@ pub fn judge(
         finger_n: last.contact.fingers,
         table_peak_n: whole.iter().map(|sample| sample.contact.table).fold(0.0, f64::max),
         shaking_rad_s: shaking,
+        stopped: fault.is_some(),
         ..Measures::of_fingers(whole)
     };
     (outcome, measures)

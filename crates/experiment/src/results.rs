@@ -1,6 +1,6 @@
 //! Results: one report a trial, written as it comes, and read back when an experiment is resumed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -90,6 +90,14 @@ pub struct Report {
     pub wall_s: Option<f64>,
 }
 
+impl Report {
+    /// True if the arm stopped by itself, for its shaking or another fault: what it did not do any more is no merit.
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        self.outcome.is_stopped() || self.measures.stopped
+    }
+}
+
 /// First line of the file of reports: what the trials belong to.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
@@ -163,6 +171,13 @@ impl Log {
         if folder.join(LINES).is_file() { Ok(()) } else { Err(ResultsError::None { folder: folder.to_owned() }) }
     }
 
+    /// True if trials were played into `folder`, or into one within it: of a study or a case.
+    #[must_use]
+    pub fn is_begun(folder: &Path) -> bool {
+        let within = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        within.chain([folder.to_owned()]).any(|folder| folder.join(LINES).is_file())
+    }
+
     /// Opens the file in `folder`; gives what it holds if `resume` allows that.
     ///
     /// A last line that broke off when the program was ended is cut away: that trial is tried again.
@@ -188,6 +203,17 @@ impl Log {
             log.line(header)?;
         }
         Ok((log, reports))
+    }
+
+    /// What the file in `folder` holds, which stays as it is: another program may be writing it.
+    ///
+    /// # Errors
+    /// [`ResultsError`]
+    pub fn read(folder: &Path, header: &Header) -> Result<Vec<Report>, ResultsError> {
+        Log::must_exist(folder)?;
+        let path = folder.join(LINES);
+        let file = File::open(&path).map_err(|cause| ResultsError::File { file: path.clone(), cause })?;
+        Ok(read(&path, file, header)?.0)
     }
 
     /// Adds a report. It is on the disk's way when this returns: an ended program loses at most the trials it was in.
@@ -285,6 +311,12 @@ impl Results {
         seeds.sort_unstable();
         seeds.dedup();
         seeds
+    }
+
+    /// Number of the cells that were tried, in this mode or in any.
+    pub fn cells(&self, mode: Option<Mode>) -> usize {
+        let reports = self.reports.iter().filter(|report| mode.is_none_or(|mode| report.key.mode == mode));
+        reports.map(|report| report.key.index).collect::<BTreeSet<_>>().len()
     }
 
     /// Cells in which a mode succeeded, in the mean over the seeds.
@@ -422,6 +454,31 @@ mod tests {
         log.add(&made[4]).unwrap();
         drop(log);
         assert_eq!(std::fs::read(&file).unwrap(), text);
+    }
+
+    #[test]
+    fn an_experiment_is_begun_once_a_trial_is_kept_in_its_folder_or_in_one_of_a_part() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(!Log::is_begun(&folder.path().join("missing")) && !Log::is_begun(folder.path()));
+        drop(Log::open(&folder.path().join("delay-1"), &header("torch"), false).unwrap());
+        assert!(Log::is_begun(folder.path()) && Log::is_begun(&folder.path().join("delay-1")));
+    }
+
+    /// The change that makes it fail: `Log::open`, which cuts off the line that another program is writing.
+    #[test]
+    fn results_that_are_only_read_stay_as_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let made = fixtures::results(&[1]).reports;
+        let (mut log, _) = Log::open(folder.path(), &header("torch"), false).unwrap();
+        made[..5].iter().for_each(|report| log.add(report).unwrap());
+        let file = folder.path().join(LINES);
+        let text = std::fs::read(&file).unwrap();
+        std::fs::write(&file, &text[..text.len() - 40]).unwrap();
+        assert_eq!(Log::read(folder.path(), &header("torch")).unwrap(), made[..4]);
+        assert_eq!(std::fs::read(&file).unwrap(), text[..text.len() - 40]);
+        let nothing = tempfile::tempdir().unwrap();
+        assert!(matches!(Log::read(nothing.path(), &header("torch")), Err(ResultsError::None { .. })));
+        assert_eq!(std::fs::read_dir(nothing.path()).unwrap().count(), 0);
     }
 
     #[test]

@@ -68,6 +68,15 @@ pub enum Progress<'a> {
         /// Trials there from before.
         done: usize,
     },
+    /// Figures are asked for of an experiment that is not through.
+    Unfinished {
+        /// Trials wanted.
+        all: usize,
+        /// Trials that are there.
+        done: usize,
+        /// Trials that count ([`Results::whole`]).
+        counted: usize,
+    },
     /// A trial ended.
     Done(&'a Report),
 }
@@ -111,14 +120,14 @@ pub fn run(
     if !cells.is_empty() {
         return Err(ExperimentError::OutOfReach(cells));
     }
+    if config.as_it_is {
+        return of_what_is_there(config, prepared, interrupt, progress);
+    }
     let (mut log, mut reports) = opened(config)?;
     let keys = config.keys();
     let all = keys.len();
-    let wanted: Vec<Key> = keys
-        .iter()
-        .copied()
-        .filter(|key| !config.as_it_is && !reports.iter().any(|report| report.key == *key))
-        .collect();
+    let is_there = |key: &Key| reports.iter().any(|report| report.key == *key);
+    let wanted: Vec<Key> = keys.iter().copied().filter(|key| !is_there(key)).collect();
     // Results of modes and seeds that are not asked for this time stay in the file, but are not counted.
     reports.retain(|report| keys.contains(&report.key));
     progress(Progress::Begin { all, done: reports.len() });
@@ -183,16 +192,40 @@ pub fn run(
 /// The log of results in the folder of an experiment, and what it holds; none without a folder.
 fn opened(config: &Config) -> Result<(Option<Log>, Vec<Report>), ExperimentError> {
     let Some(folder) = config.out.as_deref() else { return Ok((None, Vec::new())) };
-    if config.as_it_is {
-        Log::must_exist(folder)?;
-    }
-    let mut header = config.header();
-    if config.as_it_is {
-        // Results may be drawn by a later program than the one that played the trials.
-        header.described.remove(CODE);
-    }
-    let (log, reports) = Log::open(folder, &header, config.resume || config.as_it_is)?;
+    let (log, reports) = Log::open(folder, &config.header(), config.resume)?;
     Ok((Some(log), reports))
+}
+
+/// The experiment of the results that are there. A trial that is missing would count as a failure: what is not through
+/// is left out.
+fn of_what_is_there(
+    config: &Config,
+    prepared: Prepared,
+    interrupt: &Interrupt,
+    progress: &mut dyn FnMut(Progress<'_>),
+) -> Result<Experiment, ExperimentError> {
+    let folder = config.out.clone().unwrap_or_default();
+    let mut header = config.header();
+    // Results may be drawn by a later program than the one that played the trials.
+    header.described.remove(CODE);
+    let mut there = Results::new(Log::read(&folder, &header)?);
+    let keys = config.of_what_is_there(&there).keys();
+    // Modes and seeds that are not asked for this time stay in the file, but are not counted.
+    there.reports.retain(|report| keys.contains(&report.key));
+    let (all, done) = (keys.len(), there.reports.len());
+    progress(Progress::Begin { all, done });
+    let results = there.whole(&keys);
+    if results.reports.is_empty() {
+        return Err(ResultsError::None { folder }.into());
+    }
+    if done < all {
+        progress(Progress::Unfinished { all, done, counted: results.reports.len() });
+    }
+    let mut trials = Vec::new();
+    if config.keep_traces {
+        repeat_representative(config, &prepared, &results, &mut trials, interrupt)?;
+    }
+    Ok(Experiment { results, trials, prepared })
 }
 
 /// Writes a trial into the log of results, and its telemetry where recordings are kept.

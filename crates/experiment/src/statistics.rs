@@ -186,13 +186,10 @@ impl Summary {
     pub fn of(results: &Results, mode: Mode, tipping: Option<f64>) -> Summary {
         let reports: Vec<&Report> = results.of(mode).collect();
         let seeds = results.seeds();
-        let mut cells: Vec<usize> = reports.iter().map(|report| report.key.index).collect();
-        cells.sort_unstable();
-        cells.dedup();
         let count = |test: &dyn Fn(&Report) -> bool| reports.iter().filter(|report| test(report)).count();
         let mean = |word: &str| count(&|report| report.outcome.name() == word) as f64 / seeds.len().max(1) as f64;
         // What an arm that stopped did not do any more is neither gentle nor firm.
-        let went_on = || reports.iter().filter(|report| !report.outcome.is_stopped());
+        let went_on = || reports.iter().filter(|report| !report.is_stopped());
         let measured = |value: fn(&Report) -> Option<f64>| {
             Spread::of(&went_on().filter_map(|report| value(report)).collect::<Vec<_>>())
         };
@@ -206,7 +203,7 @@ impl Summary {
             seeds.iter().map(|seed| count(&|report| report.key.seed == *seed && report.outcome.is_success())).collect();
         Summary {
             mode,
-            cells: cells.len(),
+            cells: results.cells(Some(mode)),
             seeds: seeds.len(),
             success: results.success_count(mode),
             success_interval: Interval::of(std::slice::from_ref(&success_by_seed)),
@@ -239,7 +236,14 @@ impl Summary {
             table_peak_n: spread(|report| report.measures.table_peak_n),
             sag_m: measured(|report| report.sag_m),
             free_sag_m: measured(|report| report.free_sag_m.map(f64::abs)),
-            shaking_rad_s: spread(|report| report.measures.shaking_rad_s),
+            // What an arm shook that its shaking stopped is the largest of all.
+            shaking_rad_s: Spread::of(
+                &reports
+                    .iter()
+                    .filter(|report| !report.outcome.is_stopped())
+                    .map(|report| report.measures.shaking_rad_s)
+                    .collect::<Vec<_>>(),
+            ),
             detection: Detection::of(reports.iter().copied()),
         }
     }
@@ -292,6 +296,25 @@ mod tests {
         let summary = Summary::of(&results, Mode::Adaptive, Some(2.0));
         assert_eq!((summary.stopped, summary.below_tipping, summary.grip_as_asked), (24.0, Some(0.0), 0.0));
         assert_eq!((summary.sag_m.unwrap().median, summary.contact_peak_n.unwrap().median > 0.0), (0.01, true));
+    }
+
+    /// The change that makes it fail: only an outcome `stopped` is one, and an arm that its shaking stopped has the
+    /// outcome `unstable`.
+    #[test]
+    fn an_arm_that_its_shaking_stopped_is_not_gentle_either() {
+        let mut results = fixtures::results(&[1]);
+        for report in results.reports.iter_mut().filter(|report| report.key.mode == Mode::Adaptive) {
+            report.measures.contact_sustained_n = 9.0;
+            report.measures.finger_grip_n = [30.0; 3];
+            if report.key.index % 2 == 0 {
+                report.outcome = Outcome::Unstable;
+                report.measures = Measures { stopped: true, shaking_rad_s: 0.7, ..Measures::default() };
+            }
+        }
+        let summary = Summary::of(&results, Mode::Adaptive, Some(2.0));
+        assert_eq!((summary.unstable, summary.below_tipping, summary.grip_as_asked), (24.0, Some(0.0), 0.0));
+        assert!(summary.contact_peak_n.unwrap().median > 0.0 && summary.finger_grip_n.unwrap().median == 30.0);
+        assert_eq!(summary.shaking_rad_s.unwrap().max, 0.7, "it did shake");
     }
 
     #[test]

@@ -43,6 +43,7 @@ fn results_are_the_same_however_many_simulations_run_at_a_time_and_after_a_break
     let resumed = experiment::run(&Config { resume: true, ..two }, &never, &mut |progress| match progress {
         Progress::Begin { done, .. } => begun = done,
         Progress::Done(_) => tried += 1,
+        Progress::Unfinished { .. } => panic!("no figures were asked for"),
     })
     .expect("the rest");
     assert_eq!((begun, tried), (done, 4 - done));

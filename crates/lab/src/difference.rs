@@ -30,11 +30,11 @@ pub struct Largest {
 /// Differences of two runs.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Difference {
-    /// In the first cycle of the run.
+    /// In the first cycle that both have.
     pub start: Largest,
     /// From the first cycle until either feels a contact.
     pub before_contact: Largest,
-    /// When that was, s after the first cycle; `None`: never.
+    /// When that was, s after the first cycle of the run; `None`: never.
     pub contact_s: Option<f64>,
     /// Over all cycles that both have.
     pub whole: Largest,
@@ -49,6 +49,7 @@ struct Run<'a> {
     wrench: &'a [[f64; 6]],
     plan: Option<&'a [[f64; 3]]>,
     torque: Option<&'a [[f64; 7]]>,
+    phase: &'a [f64],
 }
 
 impl<'a> Run<'a> {
@@ -56,7 +57,7 @@ impl<'a> Run<'a> {
         let missing = || ComparisonError::of(recording, Lack::Columns);
         let first = recording.time.first().ok_or_else(|| ComparisonError::of(recording, Lack::Run))?;
         Ok(Run {
-            // Samples that the link lost leave a gap: cycles are matched by their number since the first one.
+            // Samples that the link lost leave a gap: cycles are matched by their number since the first one of the run.
             index: recording.time.iter().map(|time| ((time - first) * RATE).round() as usize).collect(),
             q: recording.q.as_deref().ok_or_else(missing)?,
             position: recording.position.as_deref().ok_or_else(missing)?,
@@ -64,7 +65,23 @@ impl<'a> Run<'a> {
             wrench: recording.wrench.as_deref().ok_or_else(missing)?,
             plan: recording.position_d.as_deref(),
             torque: recording.tau.as_deref(),
+            phase: recording.phase.as_deref().unwrap_or_default(),
         })
+    }
+
+    /// The cycle of this run in which another begins, by the phase: its recording may lack the first cycles of the run.
+    /// 0 where this one begins later, or the phase is not known.
+    fn cycle_of_start(&self, other: &Run<'_>) -> usize {
+        let log = |run: &Run<'_>, sample: usize| run.phase.get(sample).filter(|phase| **phase > 0.0).map(|s| s.ln());
+        let (Some(start), Some(next)) = (log(other, 0), log(other, 1)) else { return 0 };
+        let per_cycle = (start - next) / (other.index[1] - other.index[0]).max(1) as f64;
+        let before =
+            (0..self.index.len()).take_while(|&sample| log(self, sample).is_some_and(|log| log >= start)).last();
+        let Some((at, log)) = before.and_then(|at| Some((at, log(self, at)?))).filter(|_| per_cycle > 0.0) else {
+            return 0;
+        };
+        // This one may lack that very cycle.
+        self.index[at] + ((log - start) / per_cycle).round() as usize
     }
 
     fn force(&self, sample: usize) -> f64 {
@@ -98,7 +115,10 @@ impl Difference {
     /// [`ComparisonError`].
     pub fn between(one: &Recording, other: &Recording, contact: f64) -> Result<Difference, ComparisonError> {
         let (one, other) = (one.running(), other.running());
-        let (one, other) = (Run::of(&one)?, Run::of(&other)?);
+        let (mut one, mut other) = (Run::of(&one)?, Run::of(&other)?);
+        let (in_one, in_other) = (one.cycle_of_start(&other), other.cycle_of_start(&one));
+        other.index.iter_mut().for_each(|index| *index += in_one);
+        one.index.iter_mut().for_each(|index| *index += in_other);
         let [mut start, mut before_contact, mut whole] = [Largest::default(); 3];
         let mut contact_s = None;
         let mut b = 0;

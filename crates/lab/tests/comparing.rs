@@ -66,6 +66,31 @@ fn cycles_that_one_recording_lost_are_left_out_and_shift_nothing() {
     assert_eq!(difference.whole.position_m, 0.0);
 }
 
+/// The change that makes it fail: cycles are counted from the first one of a run that was recorded, which need not be
+/// its first one.
+#[test]
+fn a_recording_that_begins_in_the_middle_of_a_run_is_compared_with_that_middle() {
+    let parsed = |from: usize| {
+        let joints = (1..=7).map(|i| format!("q{i}_rad")).collect::<Vec<_>>().join(",");
+        let mut text = format!("t_s,state,phase,{joints},x_m,y_m,z_m,qw,qx,qy,qz,fx_N,fy_N,fz_N,tx_Nm,ty_Nm,tz_Nm\n");
+        for cycle in from..900 {
+            // As a device tells it: single precision, from the second step of the phase on.
+            let phase = (-4.6 * (cycle + 1) as f64 / 900.0).exp() as f32;
+            let (time, x) = ((cycle - from) as f64 / RATE, 0.001 * cycle as f64);
+            text += &format!("{time},run,{phase},0,0,0,0,0,0,{x},{x},0.2,0.3,1,0,0,0,0,0,0,0,0,0\n");
+        }
+        Recording::parse(Path::new("run.csv"), text.as_bytes()).expect("a recording")
+    };
+    let whole = parsed(0);
+    for lost in [1, 2, 40, 700] {
+        for (one, other) in [(&whole, &parsed(lost)), (&parsed(lost), &whole)] {
+            let difference = Difference::between(one, other, 1.0).expect("comparable");
+            assert_eq!(difference.whole.samples, 900 - lost, "{lost} lost");
+            assert_eq!(difference.whole.position_m, 0.0, "{lost} lost");
+        }
+    }
+}
+
 #[test]
 fn a_demonstration_without_forces_is_refused_by_name() {
     let text = (0..100).map(|i| format!("{},0.1,0.2,0.3,1,0,0,0\n", f64::from(i) / 300.0)).collect::<String>();

@@ -149,3 +149,75 @@ fn every_run_is_named_in_the_legend_beside_its_look() {
     let html = page("reach", &runs, None);
     assert!(html.contains(">1.csv, 5.csv<") && html.contains(">2.csv, 6.csv<") && html.contains(">3.csv<"));
 }
+
+/// Two recordings as one: a program that looked on wrote both runs, with a second of rest between them.
+fn joined(folder: &Path, first: &Path, second: &Path) -> PathBuf {
+    let text = |file: &Path| std::fs::read_to_string(file).unwrap();
+    let (first, second) = (text(first), text(second));
+    let last = first.lines().last().unwrap();
+    let cycle = |line: &str| line.split(',').next().and_then(|field| field.parse::<u32>().ok());
+    let mut lines: Vec<String> = first.lines().map(str::to_owned).collect();
+    let next = cycle(last).unwrap() + 1;
+    for (next, line) in (next..).zip(second.lines().filter(|line| cycle(line).is_some())) {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        fields[0] = next.to_string();
+        // The first cycle of a recording is number 1000.
+        fields[1] = (f64::from(next - 1000) / control::RATE).to_string();
+        lines.push(fields.join(","));
+    }
+    let file = folder.join("joined.csv");
+    std::fs::write(&file, lines.join("\n") + "\n").unwrap();
+    file
+}
+
+/// The change that makes it fail: all that was played counts as one run, whatever the arm did in between.
+#[test]
+fn of_two_runs_in_one_recording_the_last_is_told_and_the_way_back_is_no_gap() {
+    let folder = tempfile::tempdir().unwrap();
+    let failed = recorded(folder.path(), "first.csv", Some((State::SoftStop, Fault::ContactForce)));
+    let good = recorded(folder.path(), "second.csv", None);
+    let alone = ReportedRun::read(&good, None).unwrap();
+    let run = ReportedRun::read(&joined(folder.path(), &failed, &good), None).unwrap();
+    assert_eq!(run.missing, 0);
+    assert!((run.duration() - alone.duration()).abs() < 1e-6, "{} s, {} s", run.duration(), alone.duration());
+    assert_eq!(run.tracking, alone.tracking);
+    let surprise = |run: &ReportedRun| {
+        let found = run.happenings.iter().rfind(|happening| happening.words.contains("successful"));
+        found.map(|happening| (happening.time * control::RATE).round())
+    };
+    assert_eq!(surprise(&run), surprise(&alone), "times count from the beginning of the run that is told");
+    let html = page("joined", &[run], None);
+    assert!(html.contains("the last of 2 runs in the recording"), "a stranger has to know of the other one");
+    assert!(!page("alone", &[alone], None).contains("runs in the recording"));
+}
+
+/// The change that makes it fail: state `coast` alone is taken for a run.
+#[test]
+fn a_lost_reply_before_or_behind_a_run_is_no_part_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let coasting = |end: Option<(State, Fault)>| {
+        let text = std::fs::read_to_string(recorded(folder.path(), "run.csv", end)).unwrap();
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        let first = lines.iter().position(|line| line.starts_with("cycle,")).unwrap() + 1;
+        let count = lines.len();
+        for (at, line) in lines.iter_mut().enumerate().skip(first) {
+            let mut fields: Vec<&str> = line.split(',').collect();
+            if at == first + 10 || at == count - 20 {
+                fields[2] = State::Coast.name();
+            } else if at + 40 > count {
+                // A person has cleared the fault.
+                (fields[2], fields[3]) = (State::Hold.name(), "0");
+            }
+            *line = fields.join(",");
+        }
+        let file = folder.path().join("coasting.csv");
+        std::fs::write(&file, lines.join("\n") + "\n").unwrap();
+        ReportedRun::read(&file, None).unwrap()
+    };
+    let touched = coasting(Some((State::SoftStop, Fault::ContactForce)));
+    assert_eq!(touched.outcome, Outcome::Faulted(Fault::ContactForce));
+    let arrived = coasting(None);
+    assert_eq!(arrived.outcome, Outcome::ArrivedUnlike);
+    assert!((arrived.duration() - 4.0).abs() < 0.01, "{} s", arrived.duration());
+    assert_eq!(arrived.missing, 0);
+}

@@ -31,12 +31,17 @@ impl CheckReport {
         }
         // The fingers were not shown: options of `learn` gave their angles.
         let of_hand = broken().next().is_some() && broken().all(|margin| margin.limit == Limit::HandPosition);
+        // Such a plan comes to its goal in motion, or short of it: its end was cut off, or was never at rest.
+        let of_goal = broken().next().is_some()
+            && broken().all(|margin| matches!(margin.limit, Limit::GoalPosition | Limit::GoalOrientation));
         let is_unfit =
             broken().next().is_none() && self.violations.iter().any(|violation| violation.starts_with(UNFIT));
         let last = if is_unfit {
             "no speed and no goal helps: learn it again, from another demonstration or with other options"
         } else if of_hand {
             "learn it again with other angles of the hand (`--hand-start`, `--hand-goal`)"
+        } else if of_goal && self.goal_m.is_none() {
+            "learn it again so that it ends at rest: with a lower `--still-speed 0.001`, with `--no-trim`, or from a demonstration that rests at its goal"
         } else {
             "show the movement farther from the limits and learn it again"
         };

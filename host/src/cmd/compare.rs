@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{ErrorCode, Failure, Global};
+use super::{ErrorCode, Failure, Global, plot};
 use lab::demonstration::Recording;
 use lab::difference::Difference;
 
@@ -43,6 +43,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         );
         return Err(Failure::new(ErrorCode::RecordingOfOthers, "compare refused", text));
     }
+    [&one, &other].into_iter().for_each(|recording| plot::tell_of_others(recording, global.output()));
     for recording in [&one, &other].into_iter().filter(|recording| recording.origin.primitive.is_none()) {
         global.output().warn(format!("{} does not name its movement", recording.file.display()));
     }

@@ -74,7 +74,8 @@ pub struct Cmd {
     /// Go on with the results in the folder
     #[arg(long)]
     pub resume: bool,
-    /// Make figures and tables of the results in the folder, without trials
+    /// Make figures and tables of the results in the folder, without trials: of all modes and seeds that are there,
+    /// unless some are named
     #[arg(long, conflicts_with = "resume")]
     pub figures_only: bool,
     /// Render frames of one trial in each mode
@@ -155,6 +156,7 @@ mod work {
     use experiment::calibrated::{Calibrated, CalibrationError};
     use experiment::lift::{self, Case};
     use experiment::preparation::{self, PreparationError, Teaching};
+    use experiment::results::Log;
     use experiment::sweep::{self, Point};
     use experiment::trial::TrialError;
     use experiment::{Comparison, Config, Experiment, ExperimentError, Progress, Scenario, figures, map};
@@ -210,7 +212,8 @@ mod work {
         Ok(Config {
             object: object.unwrap_or(usual.object),
             grid: grid.moved(command.rotate, command.shift.map(|value| value * 0.01)),
-            modes: modes(command).unwrap_or(usual.modes),
+            // Figures are of everything that is there, unless a part of it is named.
+            modes: modes(command).unwrap_or(if command.figures_only { Vec::new() } else { usual.modes }),
             seeds: seeds(command),
             engine,
             plant: command.plant,
@@ -271,6 +274,7 @@ mod work {
         match (command.seed, &command.seeds) {
             (Some(seed), _) => vec![seed],
             (None, Some(seeds)) => seeds.clone().collect(),
+            (None, None) if command.figures_only => Vec::new(),
             (None, None) => vec![1],
         }
     }
@@ -341,6 +345,9 @@ mod work {
                 bar.set_position(done as u64);
                 bar.reset_eta();
             }
+            Progress::Unfinished { all, done, counted } => output.warn(format!(
+                "{done} of {all} trials are there: the figures are of the {counted} whose arms or cells are through"
+            )),
             Progress::Done(report) => {
                 bar.inc(1);
                 let key = &report.key;
@@ -380,7 +387,8 @@ mod work {
             texts.push(text);
         }
         let file = out.join("figures");
-        figures::write_lift(&rows, config.grid.cells.len() * config.seeds.len(), &file)
+        let trials = rows.iter().map(|row| row.trials).max().unwrap_or(0);
+        figures::write_lift(&rows, trials, &file)
             .map_err(|cause| Failure::new(ErrorCode::ExperimentFigure, "experiment: a figure cannot be made", cause))?;
         output.say(format!("wrote {}", file.join("sag.png").display()));
         let text = lift::table(&rows);
@@ -432,7 +440,15 @@ mod work {
         }
         if file.is_file() {
             output.say(format!("the primitive is {}", file.display()));
-            return upload::read(&file, DOING);
+            let primitive = upload::read(&file, DOING)?;
+            if primitive.statistics.is_some() || command.figures_only || Log::is_begun(out) {
+                return Ok(primitive);
+            }
+            // Somebody broke off while they were gathered. Without them nothing watches the trials, and none is told.
+            let spinner = output.spinner("recording successful runs");
+            let watched = with_statistics(command, primitive, &file, interrupt, output);
+            spinner.finish_and_clear();
+            return watched.map_err(preparation_failure);
         }
         if command.figures_only {
             let cause = format!("{} is not there", file.display());
@@ -447,19 +463,35 @@ mod work {
         let made = preparation::make(teaching, &file, jobs, interrupt, &mut |doing| {
             spinner.set_message(doing.to_owned());
         })
-        .and_then(|mut primitive| {
+        .and_then(|primitive| {
             // Whatever becomes of the statistics, the primitive is worth keeping.
             primitive.write(&file)?;
             spinner.set_message("recording successful runs");
-            let config = Config { plant: command.plant, ..Config::new(command.scenario, primitive.clone()) };
-            let (held, of) = preparation::statistics(&config, interrupt, &mut primitive)?;
-            output.say(format!("{held} of {of} runs succeeded; what is usual was learned from them"));
-            primitive.write(&file)?;
-            Ok(primitive)
+            with_statistics(command, primitive, &file, interrupt, output)
         });
         spinner.finish_and_clear();
         let primitive = made.map_err(preparation_failure)?;
         output.say(format!("taught, learned and rehearsed: {}", file.display()));
+        Ok(primitive)
+    }
+
+    /// The primitive with the statistics of successful runs, written into its file.
+    fn with_statistics(
+        command: &Cmd,
+        mut primitive: PrimitiveFile,
+        file: &Path,
+        interrupt: &Interrupt,
+        output: Output,
+    ) -> Result<PrimitiveFile, PreparationError> {
+        let usual = Config::new(command.scenario, primitive.clone());
+        let jobs = command.jobs.map_or(usual.jobs, usize::from);
+        let config = Config { plant: command.plant, jobs, ..usual };
+        let (held, of) = preparation::statistics(&config, interrupt, &mut primitive)?;
+        output.say(match primitive.statistics {
+            Some(_) => format!("{held} of {of} runs succeeded; what is usual was learned from them"),
+            None => format!("{held} of {of} runs succeeded: too few to learn what is usual, and nothing is watched"),
+        });
+        primitive.write(file)?;
         Ok(primitive)
     }
 

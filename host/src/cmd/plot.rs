@@ -85,6 +85,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if shown.is_some() && from.is_some() && learned.is_none() {
         output.warn("the primitive was learned from another demonstration than the one that is drawn");
     }
+    execution.iter().for_each(|recording| tell_of_others(recording, output));
     let tracking = execution.as_ref().map(|recording| tracking(recording, output)).transpose()?.flatten();
     let name = command
         .title
@@ -182,6 +183,14 @@ fn tracking(recording: &Recording, output: Output) -> Result<Option<Tracking>, F
             Ok(None)
         }
         Err(cause) => Err(Failure::new(ErrorCode::PlotInput, "plot", cause)),
+    }
+}
+
+/// Warns where a recording holds more runs than the one that is looked at.
+pub(super) fn tell_of_others(recording: &Recording, output: Output) {
+    let runs = recording.runs().len();
+    if runs > 1 {
+        output.warn(format!("{} holds {runs} runs: the last one is taken", recording.file.display()));
     }
 }
 

@@ -47,6 +47,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if let Some(file) = &primitive {
         runs.iter().try_for_each(|run| plot::same_movement(file, &run.running, "report refused"))?;
     }
+    for run in runs.iter().filter(|run| run.runs > 1) {
+        global.output().warn(format!("{} holds {} runs: the last one is taken", run.name, run.runs));
+    }
     let name = primitive.as_ref().map(|primitive| primitive.name.clone());
     let title = command.title.clone().or(name).or_else(|| Some(runs.first()?.name.clone())).unwrap_or_default();
     let html = page(&title, &runs, primitive.as_ref());

@@ -40,7 +40,7 @@ pub fn by_cell(
 ) -> Panel {
     let mean = |mode: Mode, index: usize| {
         // An arm that stopped did not do the rest: a bar of it would show that as done gently.
-        let reports = results.of(mode).filter(|report| report.key.index == index && !report.outcome.is_stopped());
+        let reports = results.of(mode).filter(|report| report.key.index == index && !report.is_stopped());
         let values: Vec<f64> = reports.map(|report| value(&report.measures)).collect();
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     };

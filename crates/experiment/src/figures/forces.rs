@@ -20,7 +20,7 @@ pub fn draw(results: &Results, title: &str, tipping: Option<f64>) -> Drawing {
         .iter()
         .map(|mode| {
             // What an arm that stopped did not do any more is not gentle: it has no force that could be counted.
-            let went_on = results.of(*mode).filter(|report| !report.outcome.is_stopped());
+            let went_on = results.of(*mode).filter(|report| !report.is_stopped());
             went_on.map(|report| report.measures.contact_sustained_n).collect()
         })
         .collect();
@@ -71,7 +71,8 @@ pub fn draw(results: &Results, title: &str, tipping: Option<f64>) -> Drawing {
             None => format!("{trials} trials"),
         };
         drawing.text([side, corner[1] + 62.0], words, 16, Anchor::Start, GREY);
-        drawing.text([LEFT - 12.0, corner[1] + 14.0], plain(most), 15, Anchor::End, GREY);
+        let [_, tallest] = frame.at([0.0, most]);
+        drawing.text([LEFT - 12.0, tallest + 5.0], plain(most), 15, Anchor::End, GREY);
         drawing.text([LEFT - 12.0, frame.bottom() + 5.0], "0", 15, Anchor::End, GREY);
     }
     drawing.text([LEFT + WIDTH / 2.0, height - 22.0], "force, N", 17, Anchor::Middle, INK);
@@ -106,6 +107,26 @@ mod tests {
     fn the_tipping_force_is_in_the_picture() {
         let svg = draw(&fixtures::results(&[1]), "Torch", Some(1.97)).to_svg();
         assert!(svg.contains("tips over at 2.0 N") && svg.contains("trials stay below"));
+    }
+
+    /// The change that makes it fail: the number stands at the end of the axis, which goes on beyond the tallest bar.
+    #[test]
+    fn the_number_of_trials_stands_where_the_tallest_bar_ends() {
+        let mut results = fixtures::results(&[1]);
+        results.reports.retain(|report| report.key.mode == lab::procedure::Mode::Adaptive);
+        for (at, report) in results.reports.iter_mut().enumerate() {
+            report.measures.contact_sustained_n = if at < 37 { 1.0 } else { 2.0 };
+        }
+        let svg = draw(&results, "Torch", None).to_inline_svg();
+        let y = |element: &str| -> f64 {
+            element.split_once(" y=\"").unwrap().1.split_once('"').unwrap().0.parse().unwrap()
+        };
+        let fill = colour(lab::procedure::Mode::Adaptive).to_lowercase();
+        let bars = svg.split("<rect").skip(1).filter(|rect| rect.split('>').next().unwrap().contains(&fill));
+        let top = bars.map(y).fold(f64::INFINITY, f64::min);
+        let label = svg.split("<text").find(|text| text.contains(">37<")).map(y).unwrap();
+        // The foot of letters of 15 px stands 5 px below their middle.
+        assert!((label - 5.0 - top).abs() < 0.5, "37 stands at {label}, the bar of 37 ends at {top}");
     }
 
     #[test]

@@ -41,12 +41,12 @@ pub fn draw(results: &Results, grid: &Grid, title: &str, radius: f64) -> Drawing
     let frame = Frame { corner: [LEFT, TOP], size, x, y };
     let mut drawing = Drawing::new(LEFT + size[0] + LEGEND, (TOP + size[1] + 90.0).max(TOP + 350.0));
     drawing.text([LEFT, 48.0], title, 26, Anchor::Start, INK);
-    let seeds = results.seeds().len();
+    let several = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
     let tried = format!(
-        "{} positions, {} modes, {seeds} {}",
-        grid.cells.len(),
-        results.modes().len(),
-        if seeds == 1 { "seed" } else { "seeds" }
+        "{}, {}, {}",
+        several(results.cells(None), "position"),
+        several(results.modes().len(), "mode"),
+        several(results.seeds().len(), "seed")
     );
     drawing.text([LEFT, 78.0], tried, 16, Anchor::Start, GREY);
     for (index, cell) in grid.cells.iter().enumerate() {
@@ -62,7 +62,7 @@ pub fn draw(results: &Results, grid: &Grid, title: &str, radius: f64) -> Drawing
     goal(&mut drawing, &frame, radius);
     let arrow = frame.at([frame.x[0], 0.0]);
     drawing.arrow([arrow[0] - 112.0, arrow[1]], [arrow[0] - 62.0, arrow[1]], INK, 4.0);
-    legend(&mut drawing, results, grid, [frame.right() + 44.0, TOP + 6.0]);
+    legend(&mut drawing, results, [frame.right() + 44.0, TOP + 6.0]);
     drawing
 }
 
@@ -84,23 +84,26 @@ fn apart(grid: &Grid) -> f64 {
     f64::from(pairs.min().unwrap_or(LARGEST).min(LARGEST))
 }
 
-/// Shares of a cell by the simplest mode that holds there, and what is left; nothing of a cell that was not tried.
+/// Shares of a cell by the simplest mode that holds there, seed by seed, and what no mode holds; nothing of a cell that
+/// was not tried.
 fn parts(results: &Results, index: usize) -> Vec<(f64, Colour)> {
-    let mut parts = Vec::new();
-    let mut done = 0.0;
-    let mut is_tried = false;
-    for mode in results.modes() {
-        let Some(share) = results.success_share(mode, index) else { continue };
-        is_tried = true;
-        if share > done + 1e-9 {
-            parts.push((share - done, colour(mode)));
-            done = share;
-        }
-    }
-    if is_tried && done < 1.0 - 1e-9 {
-        parts.push((1.0 - done, PALE));
-    }
-    parts
+    let held = |mode: Mode, seed: u64| {
+        let mut reports = results.of(mode).filter(|report| (report.key.index, report.key.seed) == (index, seed));
+        reports.next().map(|report| report.outcome.is_success())
+    };
+    let modes = results.modes();
+    // Of each seed with which it was tried, the simplest mode that held.
+    let simplest: Vec<Option<Mode>> = results
+        .seeds()
+        .into_iter()
+        .filter(|&seed| modes.iter().any(|&mode| held(mode, seed).is_some()))
+        .map(|seed| modes.iter().copied().find(|&mode| held(mode, seed) == Some(true)))
+        .collect();
+    let share = |of: Option<Mode>| {
+        let count = simplest.iter().filter(|mode| **mode == of).count();
+        (count > 0).then(|| (count as f64 / simplest.len() as f64, of.map_or(PALE, colour)))
+    };
+    modes.iter().copied().map(Some).chain([None]).filter_map(share).collect()
 }
 
 /// Values with their places, without those that stand less than `room` px behind the one before.
@@ -136,27 +139,34 @@ fn goal(drawing: &mut Drawing, frame: &Frame, radius: f64) {
     drawing.circle(at, 4.0, Some(INK), None);
 }
 
-fn legend(drawing: &mut Drawing, results: &Results, grid: &Grid, [x, top]: [f64; 2]) {
+fn legend(drawing: &mut Drawing, results: &Results, [x, top]: [f64; 2]) {
     let text = x + 40.0;
     let mut y = top;
     drawing.text([x, y + 16.0], "held after lifting by 10 cm for 2 s", 17, Anchor::Start, INK);
     y += 38.0;
-    for (rank, mode) in results.modes().into_iter().enumerate() {
+    // Where one mode alone was tried nobody knows what the others do.
+    let modes = results.modes();
+    let is_alone = modes.len() == 1;
+    for mode in modes {
         drawing.rectangle([x, y], [28.0, 28.0], colour(mode));
-        let words = match (mode, rank) {
-            (Mode::Track, _) => "with stiff position control",
-            (Mode::OpenLoop, _) => "already in open loop",
-            (Mode::ForceControl, _) => "with force control",
-            (Mode::Adaptive, _) => "only with adaptation of the movement",
-            (Mode::RigidFingers, _) => "only if the fingers do not adapt",
+        let words = match mode {
+            Mode::Track => "with stiff position control",
+            Mode::OpenLoop if is_alone => "in open loop",
+            Mode::OpenLoop => "already in open loop",
+            Mode::ForceControl => "with force control",
+            Mode::Adaptive if is_alone => "with adaptation of the movement",
+            Mode::Adaptive => "only with adaptation of the movement",
+            Mode::RigidFingers if is_alone => "if the fingers do not adapt",
+            Mode::RigidFingers => "only if the fingers do not adapt",
         };
         drawing.text([text, y + 13.0], words, 16, Anchor::Start, INK);
-        let count = format!("this mode: {} of {}", short(results.success_count(mode)), grid.cells.len());
+        let count = format!("this mode: {} of {}", short(results.success_count(mode)), results.cells(Some(mode)));
         drawing.text([text, y + 32.0], count, 15, Anchor::Start, GREY);
         y += 54.0;
     }
     drawing.rectangle([x, y], [28.0, 28.0], PALE);
-    drawing.text([text, y + 19.0], "in no mode", 16, Anchor::Start, INK);
+    let none = if is_alone { "not held" } else { "in no mode" };
+    drawing.text([text, y + 19.0], none, 16, Anchor::Start, INK);
     y += 50.0;
     drawing.circle([x + 14.0, y + 8.0], 14.0, None, Some((INK, 2.2)));
     drawing.circle([x + 14.0, y + 8.0], 3.5, Some(INK), None);
@@ -192,6 +202,35 @@ mod tests {
         }
         assert_eq!(parts(&results, 7), [(1.0, PALE)]);
         assert_eq!(parts(&results, 999), [], "nobody tried it: it is not shown as one that failed");
+    }
+
+    /// The change that makes it fail: one legend, whatever was tried.
+    #[test]
+    fn of_one_mode_alone_nothing_is_said_of_the_others() {
+        let mut results = fixtures::results(&[1]);
+        results.reports.retain(|report| report.key.mode == Mode::Adaptive);
+        let svg = draw(&results, &Grid::paper(), "Torch", 0.03).to_svg();
+        assert!(
+            !svg.contains("only with") && svg.contains(">with adaptation of the movement<"),
+            "nobody tried without"
+        );
+        assert!(svg.contains(">not held<") && !svg.contains("in no mode") && svg.contains("1 mode, 1 seed"));
+    }
+
+    /// The change that makes it fail: the shares of the modes, which are not those of the seeds they belong to.
+    #[test]
+    fn a_cell_that_one_mode_or_another_held_with_every_seed_is_not_in_no_mode() {
+        let mut results = fixtures::results(&[1, 2, 3, 4]);
+        for report in results.reports.iter_mut().filter(|report| report.key.index == 5) {
+            let held = match report.key.mode {
+                Mode::OpenLoop => report.key.seed == 1,
+                Mode::Adaptive => report.key.seed == 2 || report.key.seed == 3,
+                _ => false,
+            };
+            report.outcome = if held { Outcome::Held } else { Outcome::Missed };
+        }
+        let expected = [(0.25, colour(Mode::OpenLoop)), (0.5, colour(Mode::Adaptive)), (0.25, PALE)];
+        assert_eq!(parts(&results, 5), expected);
     }
 
     /// An attribute of every element of a kind, and the text in it.

@@ -10,6 +10,7 @@ mod leap;
 pub mod origin;
 pub mod recording;
 pub mod resample;
+mod runs;
 pub mod writer;
 
 pub use error::{DemonstrationError, Place, RecordingError};

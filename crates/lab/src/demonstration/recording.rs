@@ -165,21 +165,7 @@ impl Recording {
         self.time.is_empty()
     }
 
-    /// The part in which a plan was played (states `run` and `coast`), as a recording of its own; the whole
-    /// recording if it has no states.
-    ///
-    /// A run is recorded from before the arm moves until it holds at the goal: comparing it with its plan needs the
-    /// part in between.
-    pub fn running(&self) -> Recording {
-        let Some(states) = &self.state else {
-            return self.clone();
-        };
-        let names = [control::State::Run.name(), control::State::Coast.name()];
-        let keep: Vec<usize> = (0..self.len()).filter(|index| names.contains(&states[*index].as_str())).collect();
-        self.select(&keep)
-    }
-
-    fn select(&self, keep: &[usize]) -> Recording {
+    pub(super) fn select(&self, keep: &[usize]) -> Recording {
         fn pick<T: Clone>(values: &[T], keep: &[usize]) -> Vec<T> {
             keep.iter().map(|index| values[*index].clone()).collect()
         }

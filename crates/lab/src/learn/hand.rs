@@ -3,6 +3,11 @@
 //! A minimum jerk from one hand posture to another within a window of the movement, so that all fingers close
 //! together: `b(r) = 10 r^3 - 15 r^4 + 6 r^5`.
 
+use super::Recording;
+
+/// A digit that stands this far, rad, from where the primitive begins, or moves so far, is another hand's.
+const OTHERWISE: f64 = 0.3;
+
 /// Movement of the fingers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HandMotion {
@@ -29,6 +34,41 @@ impl HandMotion {
             && (0.0..1.0).contains(&begin)
             && begin < end
             && end <= 1.0
+    }
+
+    /// Warnings of a hand that stood or moved otherwise in a recording, but for these times (s) at its beginning and
+    /// end: the fingers are not learned from it.
+    pub(super) fn warnings(&self, recording: &Recording, (before, behind): (f64, f64)) -> Vec<String> {
+        let [begun, ended] = [recording.time.first(), recording.time.last()].map(|time| time.copied().unwrap_or(0.0));
+        let (from, to) = (begun + before, ended - behind);
+        let shown: Vec<[f64; 4]> = recording
+            .hand
+            .iter()
+            .flatten()
+            .zip(&recording.time)
+            .filter(|(_, time)| (from..=to).contains(*time))
+            .map(|(hand, _)| *hand)
+            .collect();
+        let (Some(first), Some(last)) = (shown.first(), shown.last()) else { return Vec::new() };
+        let apart = |one: &[f64; 4], other: &[f64; 4]| {
+            one.iter().zip(other).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
+        };
+        let mut warnings = Vec::new();
+        if apart(first, &self.start) > OTHERWISE {
+            let words = |hand: &[f64; 4]| hand.map(|angle| format!("{angle:.2}")).join(",");
+            warnings.push(format!(
+                "the hand stood otherwise when the movement was shown than the primitive begins with; `--hand-start {} --hand-goal {}` begins and ends as shown",
+                words(first),
+                words(last)
+            ));
+        }
+        let moved = shown.iter().map(|hand| apart(hand, first)).fold(0.0, f64::max);
+        if moved > OTHERWISE && apart(&self.start, &self.goal) == 0.0 {
+            warnings.push(format!(
+                "the fingers moved by up to {moved:.2} rad while the movement was shown, which is not learned; `--hand-goal` says where they go, once, and `--hand-window` when"
+            ));
+        }
+        warnings
     }
 
     /// The hand at `samples` instants, evenly spaced over the movement.

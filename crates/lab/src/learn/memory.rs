@@ -294,6 +294,10 @@ fn runs<const CHANNELS: usize>(
             {
                 return Err(MemoryError::Others { file: recording.file.clone(), found, expected: expected.clone() });
             }
+            if let Some(second) = recording.runs().get(1) {
+                let line = recording.lines.get(second.start).copied().unwrap_or_default();
+                return Err(MemoryError::Several { file: recording.file.clone(), line });
+            }
             let run = recording.running();
             let (samples, found) = progress(&run, primitive.movement.alpha)?;
             if (found - duration).abs() > SAME_DURATION * duration || !found.is_finite() {

@@ -206,6 +206,7 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
         }
     };
     warnings.extend(moving_ends(&demonstration.speed()));
+    warnings.extend(options.hand.warnings(recording, demonstration.trimmed));
     if demonstration.pose_source == PoseSource::JointAngles && recording.position.is_some() {
         check_pose_columns(recording, &mut warnings);
     }

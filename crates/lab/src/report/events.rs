@@ -31,11 +31,9 @@ const OUT_OF_THE_ORDINARY: [(u32, &str); 9] = [
     (flags::CONTACT_UNSEEN, "a push came that the force sensor does not see"),
 ];
 
-/// Everything that happened, in its order.
-pub(super) fn of(recording: &Recording, alpha: f64) -> Vec<Happening> {
-    let names = [control::State::Run.name(), control::State::Coast.name()];
+/// Everything that happened, in its order; `began` is the first sample of the run that is told.
+pub(super) fn of(recording: &Recording, began: usize, alpha: f64) -> Vec<Happening> {
     let states = recording.state.as_deref().unwrap_or_default();
-    let began = states.iter().position(|state| names.contains(&state.as_str())).unwrap_or(0);
     let zero = recording.time.get(began).copied().unwrap_or(0.0);
     let at = |sample: usize, words: String| Happening {
         time: recording.time.get(sample).map_or(0.0, |time| time - zero),

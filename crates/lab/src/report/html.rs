@@ -64,11 +64,15 @@ fn asked(runs: &[ReportedRun], primitive: Option<&PrimitiveFile>) -> String {
 fn happened(run: &ReportedRun) -> String {
     let class = if run.outcome.is_good() { "good" } else { "bad" };
     let at = |(value, progress): (f64, f64), unit: &str| format!("{value:.2} {unit} at {:.0} %", 100.0 * progress);
-    let mut rows = vec![
+    let mut rows = Vec::new();
+    if run.runs > 1 {
+        rows.push(("told here", format!("the last of {} runs in the recording", run.runs)));
+    }
+    rows.extend([
         ("outcome", format!("<span class=\"{class}\">{}</span>", escaped(&run.outcome.words()))),
         ("duration", format!("{:.2} s", run.duration())),
         ("came to", format!("{:.0} %", 100.0 * run.progress.last().copied().unwrap_or(0.0))),
-    ];
+    ]);
     if let Some(tracking) = &run.tracking {
         let [rms, max, end] =
             [tracking.position_rms_m, tracking.position_max_m, tracking.position_end_m].map(|m| 1e3 * m);

@@ -6,6 +6,7 @@ mod figures;
 mod html;
 mod watched;
 
+use std::ops::Range;
 use std::path::Path;
 
 use control::{Fault, State};
@@ -26,7 +27,9 @@ pub struct ReportedRun {
     pub name: String,
     /// Notes at the head of the recording.
     pub notes: Vec<String>,
-    /// The part in which a plan was played.
+    /// The runs that the recording holds; the last one is told here.
+    pub runs: usize,
+    /// The part in which its plan was played.
     pub running: Recording,
     /// Progress of the movement at each of its samples, 0 to 1.
     pub progress: Vec<f64>,
@@ -107,11 +110,13 @@ impl ReportedRun {
         }
         let notes = recording::notes(&bytes);
         let alpha = primitive.map_or(CanonicalSystem::<f64>::DEFAULT_ALPHA, |primitive| primitive.movement.alpha);
+        let runs = recording.runs();
+        let last = runs.last().cloned().unwrap_or_default();
         let running = recording.running();
         let mut flags = FlagCounts::default();
         running.flags.iter().flatten().for_each(|sample| flags.add(*sample));
         let progress: Vec<f64> = running.phase.iter().flatten().map(|phase| progress(*phase, alpha)).collect();
-        let mut happenings = events::of(&recording, alpha);
+        let mut happenings = events::of(&recording, last.start, alpha);
         let departures = primitive.map(|primitive| watched::departures(&running, &progress, primitive));
         for departure in departures.into_iter().flatten() {
             let time = |sample: usize| running.time.get(sample).copied().unwrap_or(0.0);
@@ -127,7 +132,8 @@ impl ReportedRun {
             name: file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
             notes,
             progress,
-            outcome: match outcome(&recording) {
+            runs: runs.len(),
+            outcome: match outcome(&recording, &last) {
                 Outcome::Arrived if is_unlike => Outcome::ArrivedUnlike,
                 outcome => outcome,
             },
@@ -172,16 +178,14 @@ fn progress(phase: f64, alpha: f64) -> f64 {
     if phase > 0.0 { (-phase.ln() / alpha).clamp(0.0, 1.0) + 0.0 } else { 0.0 }
 }
 
-/// The end of the last run in a recording: what came right behind it counts. A fault that was cleared before, and
-/// what the arm did afterwards, are other stories.
-fn outcome(recording: &Recording) -> Outcome {
-    let states: Vec<Option<State>> = recording.state.iter().flatten().map(|name| named(name)).collect();
-    let is_running = |state: &Option<State>| matches!(state, Some(State::Run | State::Coast));
-    let last = states.iter().rposition(is_running);
-    if last.is_none() && recording.state.is_some() {
+/// The end of the run of these samples: what came right behind it counts. A fault that was cleared before, and what the
+/// arm did afterwards, are other stories.
+fn outcome(recording: &Recording, run: &Range<usize>) -> Outcome {
+    if run.is_empty() {
         return Outcome::NeverBegan;
     }
-    let behind = last.map_or(0, |last| last + 1);
+    let states: Vec<Option<State>> = recording.state.iter().flatten().map(|name| named(name)).collect();
+    let behind = run.end;
     // Until the arm is taken up again: that clears the fault.
     let taken_up = |state: &Option<State>| matches!(state, Some(State::Hold | State::Gravity | State::Approach));
     let end = states.iter().skip(behind).position(taken_up).map_or(recording.len(), |at| behind + at);

@@ -71,7 +71,10 @@ pub(crate) fn text(rows: &[RecordingRow]) -> String {
 /// Writes the recording of a movement of `duration` s to a folder.
 pub(crate) fn demonstration(folder: &Path, duration: f64) -> PathBuf {
     let file = folder.join("demo.csv");
-    std::fs::write(&file, text(&rows(duration))).expect("a writable folder");
+    let mut rows = rows(duration);
+    // An open hand, as the primitive that is learned from it begins.
+    rows.iter_mut().for_each(|row| row.telemetry.hand = [0.0; 4]);
+    std::fs::write(&file, text(&rows)).expect("a writable folder");
     file
 }
 
