@@ -226,10 +226,8 @@ pub fn judge(
         return (Outcome::Stopped(fault.unwrap_or("nothing was seen").to_owned()), Measures::default());
     };
     let run = observation.between(marks.run, marks.lift);
-    let closing = run
-        .iter()
-        .find(|sample| (1..4).any(|finger| sample.digits[finger] - first.digits[finger] > CLOSING))
-        .map(|sample| sample.time);
+    let closes = |sample: &&Sample| (1..4).any(|finger| sample.digits[finger] - first.digits[finger] > CLOSING);
+    let closing = run.iter().find(closes).map(|sample| sample.time);
     let before = observation.between(marks.run, closing.unwrap_or(marks.lift));
     let lifted = observation.between(marks.lift, f64::INFINITY);
     let height = |sample: &Sample| sample.object[2] - first.object[2];

@@ -205,7 +205,7 @@ impl Log {
         Ok((log, reports))
     }
 
-    /// What the file in `folder` holds, which stays as it is: another program may be writing it.
+    /// The reports in the file in `folder`, which stays as it is: another program may be writing it.
     ///
     /// # Errors
     /// [`ResultsError`]

@@ -57,7 +57,7 @@ impl<'a> Run<'a> {
         let missing = || ComparisonError::of(recording, Lack::Columns);
         let first = recording.time.first().ok_or_else(|| ComparisonError::of(recording, Lack::Run))?;
         Ok(Run {
-            // Samples that the link lost leave a gap: cycles are matched by their number since the first one of the run.
+            // Samples that the link lost leave a gap: cycles are matched by their number since the first of the run.
             index: recording.time.iter().map(|time| ((time - first) * RATE).round() as usize).collect(),
             q: recording.q.as_deref().ok_or_else(missing)?,
             position: recording.position.as_deref().ok_or_else(missing)?,

@@ -4,7 +4,7 @@
 //! all the time. Bytes on the chosen line pass through untouched. On the others a [`Listener`] waits for a whole frame
 //! whose check sum is right; then that line is chosen, its frame is handed on, and what is sent goes there from then
 //! on. Noise on a line that nobody uses, an open input or another program's chatter never takes the conversation away.
-//! What the line left behind had begun is ended by a zero byte: it will not come to its end here.
+//! A zero byte ends what the line left behind had begun: it will not come to its end here.
 //!
 //! The session decides if a new host may take over from the old one, not the line: it refuses a second
 //! host while the first is heard, and the refusal goes back on the line the request came from.

@@ -123,8 +123,8 @@ fn feels(law: Law) -> bool {
     matches!(law, Law::Run { feedback, force, .. } if feedback || force)
 }
 
-/// The forces under which a loop is kicked (N). A plan that bends gives way by a quarter of a metre: pushed out, the arm
-/// would end stretched, so it is pushed in.
+/// The forces under which a loop is kicked (N). A plan that bends gives way by a quarter of a metre: pushed out, the
+/// arm would end stretched, so it is pushed in.
 fn pushes(law: Law) -> Vec<Vector3<f64>> {
     let (out, mut pushes) = (Vector3::from(PUSH), vec![Vector3::zeros()]);
     match law {
