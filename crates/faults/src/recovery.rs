@@ -21,8 +21,9 @@ const TIMEOUT: Duration = Duration::from_secs(60);
 /// Time that a person takes between pendant and keyboard.
 const NOTICE: Duration = Duration::from_millis(500);
 
-/// Time for which a cause may still be seen after it is gone.
-const LOOKING_AGAIN: Duration = Duration::from_secs(5);
+/// Number of times that a person looks again whom the device tells that the cause is still there: for five seconds at
+/// an arm that rests.
+const LOOKS: u32 = 10;
 
 /// Distance of the joint angles told from the true ones after a zeroing, rad: a count of M7, and what the arm moved.
 const BELIEVED: f64 = 0.02;
@@ -98,16 +99,19 @@ fn rest(arm: &mut Arm) -> Result<(), Failure> {
     Err("the arm does not come to rest".into())
 }
 
-/// Clears the fault. A person who is told that the cause is still there looks again: motors are asked for their
-/// temperature once a second.
+/// Clears the fault. A person who is told that the cause is still there lets the arm come to rest, as the device says,
+/// and looks again: an arm may turn slowly on its brakes, and motors are asked for their temperature once a second.
 fn clear(arm: &mut Arm) -> Result<(), Failure> {
-    let deadline = arm.now() + LOOKING_AGAIN;
-    loop {
+    for _ in 0..LOOKS {
         match arm.clear_fault() {
-            Err(HostError::Refused { reason: Refusal::CauseRemains, .. }) if arm.now() < deadline => wait(arm)?,
+            Err(HostError::Refused { reason: Refusal::CauseRemains, .. }) => {
+                rest(arm)?;
+                wait(arm)?;
+            }
             cleared => return cleared.map_err(|error| format!("clear: {error}").into()),
         }
     }
+    arm.clear_fault().map_err(|error| format!("clear: {error}").into())
 }
 
 /// Lets time pass; what the device tells meanwhile does not matter.
