@@ -24,8 +24,10 @@ use system_tests::expect;
 /// hand's reach (4 cm farther, 12 cm aside), and one that contact may decide otherwise when something harmless changes.
 const HELD_BY_TOUCH: f64 = 10.0;
 
-/// The same twelve in open loop: no more than stand within the reach of an open hand.
-const HELD_BLINDLY: f64 = 3.0;
+/// The same twelve in open loop: three within the reach of an open hand, one of them at its very edge, 4 cm farther and
+/// 8 cm aside (three of five arms held it before hands stood nearer to their plan), and one that is pushed upright to
+/// the goal.
+const HELD_BLINDLY: f64 = 4.0;
 
 /// Three of the twelve for the firmware, at both ends of the grid and in its middle.
 const CELLS_OF_FIRMWARE: &str = "0:0,-8:4,-16:8";
