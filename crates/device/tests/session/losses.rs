@@ -1,7 +1,7 @@
 //! Which images the store has lost, as a host is told.
 
 use device::storage::{Library, Opening};
-use link::{Refusal, Reply, Request};
+use link::{Name, Refusal, Reply, Request, RunOptions};
 
 use crate::rig::{Rig, SLOT_BYTES, SLOTS, image};
 
@@ -37,4 +37,31 @@ fn h11_an_image_that_was_read_and_is_not_sound_is_missed_unless_its_name_stands_
     let mut rig = restored(&[damaged, image("reach", 3.0, 10)]);
     assert_eq!((loss(&mut rig, 0), loss(&mut rig, 1)), ((None, 0), (None, 0)));
     assert_eq!(rig.refused(Request::Storage { place: SLOTS as u8 }), (Refusal::NoSuchPrimitive, [SLOTS as u32, 0]));
+}
+
+#[test]
+fn h11_of_two_images_of_one_name_the_one_is_believed_whose_place_has_lost_nothing() {
+    // "reach" was renamed to "reach-old", and another "reach" came to place 1. Then the renamed one was damaged: the
+    // image of before stands at place 0 again, under the name that is another one's by now.
+    let mut library = Library::<SLOTS, SLOT_BYTES>::new();
+    let (before, now) = (image("reach", 3.0, 10), image("reach", 5.0, 10));
+    library.restore(0, &before);
+    library.restore(1, &now);
+    library.lose(0, &image("reach-old", 3.0, 10));
+    library.open(Opening::default());
+    let mut rig = Rig::over(library);
+    rig.greet();
+    assert_eq!(rig.names(), ["reach"]);
+    rig.commanded(Request::Run { name: Name::new("reach").unwrap(), options: RunOptions::default() });
+    assert_eq!(rig.bench.loaded, [5.0]);
+    // Nobody is told that an image of before is used, and the place is free for others.
+    assert_eq!(loss(&mut rig, 0), (Some(Some("reach-old".to_owned())), 1));
+    let Some(Reply::Storage { storage, .. }) = rig.ask(Request::Storage { place: 0 }) else { panic!() };
+    assert!(!storage.loss.unwrap().older);
+    // Deleted, it does not come back as the one of before.
+    assert_eq!(rig.ask(Request::Delete { name: Name::new("reach").unwrap() }), None);
+    assert!(rig.session.store_mut().take(&mut [0; SLOT_BYTES]).is_some());
+    rig.session.store_mut().settle(Ok(()));
+    rig.poll();
+    assert_eq!(rig.names(), Vec::<String>::new());
 }

@@ -71,7 +71,24 @@ impl Directory {
             let image = store.image(slot).and_then(|bytes| PrimitiveImage::parse(bytes).ok());
             *entry = image.as_ref().map(Entry::of);
         }
+        directory.keep_one_of_each(store);
         directory
+    }
+
+    /// Of two places with one name the one counts that has lost nothing: at the other a damaged image has let the one
+    /// before it come back, whose name was given away since. That one is as good as none.
+    fn keep_one_of_each(&mut self, store: &impl Store) {
+        let has_lost = |slot: u8| store.report(slot).loss.is_some();
+        for slot in 0..self.places {
+            for other in 0..slot {
+                let names = self.get(other).zip(self.get(slot)).map(|(other, entry)| (&other.name, &entry.name));
+                if names.is_some_and(|(other, name)| other == name) {
+                    // Where both have lost something nobody knows which is newer: the first one counts.
+                    let dropped = if has_lost(other) && !has_lost(slot) { other } else { slot };
+                    self.set(dropped, None);
+                }
+            }
+        }
     }
 
     /// Number of places.
@@ -103,6 +120,10 @@ impl Directory {
             && let Some(image) = store.image(place)
         {
             report.loss = Some(LostImage { place, name: legible_name(image), older: false });
+        }
+        if let Some(loss) = &mut report.loss {
+            // What came back under a name that stands elsewhere is not used.
+            loss.older &= self.get(place).is_some();
         }
         let is_back = |loss: &LostImage| loss.name.as_ref().is_some_and(|name| self.find(name).is_some());
         report.loss = report.loss.filter(|loss| loss.older || !is_back(loss));
