@@ -75,13 +75,40 @@ pub struct Point {
     pub value: Option<f64>,
     /// Cells that were tried with each arm.
     pub cells: usize,
+    /// The arms, by their seeds, of which every demonstration has a count.
+    #[serde(skip)]
+    arms: Vec<u64>,
     /// The modes with their counts, `[demonstration][arm]`.
     pub held: Vec<(Mode, Vec<Vec<usize>>)>,
 }
 
 impl Point {
-    /// Adds a demonstration: the statistics of its modes.
-    pub fn add(&mut self, modes: &[Summary]) {
+    /// Before any demonstration.
+    #[must_use]
+    pub fn new(value: Option<f64>) -> Self {
+        Point { value, cells: 0, arms: Vec::new(), held: Vec::new() }
+    }
+
+    /// The same with these counts of the arms 1, 2, and so on.
+    #[cfg(test)]
+    pub(crate) fn with(value: f64, held: Vec<(Mode, Vec<Vec<usize>>)>) -> Self {
+        let arms = held.iter().flat_map(|(_, counts)| counts).map(Vec::len).max().unwrap_or(0) as u64;
+        Point { cells: 48, arms: (1..=arms).collect(), held, ..Point::new(Some(value)) }
+    }
+
+    /// Adds a demonstration: the statistics of its modes, of these arms. An arm that a demonstration lacks is left out
+    /// of all, else the counts of different arms would stand for one.
+    pub fn add(&mut self, modes: &[Summary], arms: &[u64]) {
+        let before = std::mem::take(&mut self.arms);
+        let is_first = self.held.is_empty();
+        self.arms = arms.iter().copied().filter(|arm| is_first || before.contains(arm)).collect();
+        let of_all = |counts: &[usize], arms: &[u64]| -> Vec<usize> {
+            let counted = counts.iter().zip(arms).filter(|(_, arm)| self.arms.contains(arm));
+            counted.map(|(count, _)| *count).collect()
+        };
+        for counts in self.held.iter_mut().flat_map(|(_, counts)| counts) {
+            *counts = of_all(counts, &before);
+        }
         for summary in modes {
             self.cells = summary.cells;
             let place = self.held.iter().position(|(mode, _)| *mode == summary.mode);
@@ -89,8 +116,14 @@ impl Point {
                 self.held.push((summary.mode, Vec::new()));
                 self.held.len() - 1
             });
-            self.held[place].1.push(summary.success_by_seed.clone());
+            self.held[place].1.push(of_all(&summary.success_by_seed, arms));
         }
+    }
+
+    /// The arms, by their seeds, of which every demonstration has a count.
+    #[must_use]
+    pub fn arms(&self) -> &[u64] {
+        &self.arms
     }
 
     /// Mean of a mode with its interval; of one arm and one demonstration the count alone.
@@ -139,9 +172,11 @@ pub fn table(points: &[Point], name: Option<&str>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures;
+    use crate::outcome::Outcome;
 
     fn point(value: f64, held: usize) -> Point {
-        Point { value: Some(value), cells: 48, held: vec![(Mode::Adaptive, vec![vec![held, held + 2]])] }
+        Point::with(value, vec![(Mode::Adaptive, vec![vec![held, held + 2]])])
     }
 
     #[test]
@@ -172,6 +207,26 @@ mod tests {
         assert!(!has_failed(&[point(1.0, 40)]));
         assert!(!has_failed(&[point(1.0, 40), point(0.5, 20)]));
         assert!(has_failed(&[point(1.0, 40), point(0.5, 20), point(0.0, 19)]));
+    }
+
+    /// The change that makes it fail: the counts of demonstrations that lack an arm are paired by their places.
+    #[test]
+    fn an_arm_that_a_demonstration_lacks_is_left_out_of_all() {
+        let mut point = Point::new(Some(0.0));
+        let mut of = |seeds: &[u64], at: fn(u64) -> usize| {
+            let mut results = fixtures::results(seeds);
+            for report in &mut results.reports {
+                let held = report.key.mode == Mode::Adaptive && report.key.index < at(report.key.seed);
+                report.outcome = if held { Outcome::Held } else { Outcome::Missed };
+            }
+            let summary = Summary::of(&results, Mode::Adaptive, None);
+            point.add(&[summary], &results.seeds());
+        };
+        // Of the arms 1, 2 and 3 the second demonstration lacks the first.
+        of(&[1, 2, 3], |seed| [0, 10, 20, 30][seed as usize]);
+        of(&[2, 3], |seed| [0, 10, 20, 30][seed as usize]);
+        assert_eq!(point.held, [(Mode::Adaptive, vec![vec![20, 30]; 2])]);
+        assert_eq!((point.arms.as_slice(), point.interval(Mode::Adaptive).unwrap().mean), (&[2, 3][..], 25.0));
     }
 
     #[test]

@@ -301,7 +301,7 @@ mod work {
             command.sweep.as_ref().map_or_else(|| vec![None], |s| s.values.iter().copied().map(Some).collect());
         let mut points: Vec<Point> = Vec::new();
         for value in values {
-            let mut point = Point { value, cells: 0, held: Vec::new() };
+            let mut point = Point::new(value);
             for config in &configs {
                 let mut config = config.clone();
                 if let (Some(sweep), Some(value)) = (&command.sweep, value) {
@@ -311,7 +311,7 @@ mod work {
                 let (experiment, wall) = carry(&config, interrupt, output)?;
                 let folder = config.out.clone().unwrap_or_default();
                 report(&config, &experiment, &folder, command.render, output, wall)?;
-                point.add(&experiment.summaries(&config));
+                point.add(&experiment.summaries(&config), &experiment.results.seeds());
             }
             points.push(point);
             output.say(sweep::table(&points, name));

@@ -60,10 +60,8 @@ mod tests {
 
     #[test]
     fn every_value_has_its_mark_and_its_bar() {
-        let point = |value: f64, held: usize| Point {
-            value: Some(value),
-            cells: 48,
-            held: vec![(Mode::OpenLoop, vec![vec![9, 12]]), (Mode::Adaptive, vec![vec![held, held + 2]])],
+        let point = |value: f64, held: usize| {
+            Point::with(value, vec![(Mode::OpenLoop, vec![vec![9, 12]]), (Mode::Adaptive, vec![vec![held, held + 2]])])
         };
         let points = [point(1.0, 46), point(0.5, 40), point(0.0, 20)];
         let svg = draw(&points, "joint-friction", "Torch: what it stands").to_svg();
@@ -75,7 +73,7 @@ mod tests {
     fn the_names_of_all_modes_stay_on_the_page() {
         let modes = [Mode::OpenLoop, Mode::ForceControl, Mode::Adaptive, Mode::RigidFingers];
         let held = modes.map(|mode| (mode, vec![vec![9, 12]])).to_vec();
-        let points = [1.0, 0.5].map(|value| Point { value: Some(value), cells: 48, held: held.clone() });
+        let points = [1.0, 0.5].map(|value| Point::with(value, held.clone()));
         let svg = draw(&points, "joint-friction", "Torch").to_inline_svg();
         let width: f64 = svg.split_once("viewBox=\"0 0 ").unwrap().1.split_once(' ').unwrap().0.parse().unwrap();
         let last = svg.split("<text ").find(|text| text.contains("(d) ")).unwrap();
