@@ -105,10 +105,21 @@ impl Calibrated {
     pub fn complete(&mut self, config: &Config, interrupt: &Interrupt) -> Result<(), CalibrationError> {
         let missing: Vec<u64> = config.seeds.iter().copied().filter(|seed| !self.arms.contains_key(seed)).collect();
         let weighed = in_parallel(config.jobs, &missing, |seed| weigh_arm(config, *seed, interrupt));
-        for (seed, weighed) in missing.into_iter().zip(weighed) {
-            self.arms.insert(seed, weighed?);
+        self.keep(missing.into_iter().zip(weighed))
+    }
+
+    /// Keeps all that was found, behind an error too: each arm took its time. The first error is told.
+    fn keep<Error>(&mut self, weighed: impl Iterator<Item = (u64, Result<Weighed, Error>)>) -> Result<(), Error> {
+        let mut outcome = Ok(());
+        for (seed, weighed) in weighed {
+            match weighed {
+                Ok(weighed) => {
+                    self.arms.insert(seed, weighed);
+                }
+                Err(error) => outcome = outcome.and(Err(error)),
+            }
         }
-        Ok(())
+        outcome
     }
 
     /// The corrections by seed, for [`Config::weights`].
@@ -173,6 +184,14 @@ mod tests {
         assert_ne!(weighed(None).correction(), Ok(none));
         assert_eq!(weighed(Some("no better than before".to_owned())).correction(), Ok(none));
         assert_eq!(weighed(None).worst(), [0.5, 0.01]);
+    }
+
+    #[test]
+    fn the_arms_behind_one_that_was_not_weighed_are_kept_and_the_first_error_is_told() {
+        let mut calibrated = Calibrated::default();
+        let found = [(1, Ok(weighed(None))), (2, Err("two")), (3, Ok(weighed(None))), (4, Err("four"))];
+        assert_eq!(calibrated.keep(found.into_iter()), Err("two"));
+        assert_eq!(calibrated.arms.keys().copied().collect::<Vec<_>>(), [1, 3]);
     }
 
     #[test]

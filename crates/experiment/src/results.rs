@@ -183,20 +183,17 @@ impl Log {
     /// A last line that broke off when the program was ended is cut away: that trial is tried again.
     ///
     /// # Errors
-    /// [`ResultsError`]
+    /// [`ResultsError`], also while another program writes the file: what is cut away might be its line.
     pub fn open(folder: &Path, header: &Header, resume: bool) -> Result<(Log, Vec<Report>), ResultsError> {
         let path = folder.join(LINES);
         let failed = |cause| ResultsError::File { file: path.clone(), cause };
         std::fs::create_dir_all(folder).map_err(failed)?;
-        let (reports, length) = match File::open(&path) {
-            Ok(file) => read(&path, file, header)?,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => (Vec::new(), 0),
-            Err(cause) => return Err(failed(cause)),
-        };
+        let file = OpenOptions::new().create(true).read(true).append(true).open(&path).map_err(failed)?;
+        output_file::lock(&file).map_err(failed)?;
+        let (reports, length) = read(&path, &file, header)?;
         if !resume && !reports.is_empty() {
             return Err(ResultsError::Exists { file: path, trials: reports.len() });
         }
-        let file = OpenOptions::new().create(true).append(true).open(&path).map_err(failed)?;
         file.set_len(length).map_err(failed)?;
         let mut log = Log { path: path.clone(), file };
         if length == 0 {
@@ -213,7 +210,7 @@ impl Log {
         Log::must_exist(folder)?;
         let path = folder.join(LINES);
         let file = File::open(&path).map_err(|cause| ResultsError::File { file: path.clone(), cause })?;
-        Ok(read(&path, file, header)?.0)
+        Ok(read(&path, &file, header)?.0)
     }
 
     /// Adds a report. It is on the disk's way when this returns: an ended program loses at most the trials it was in.
@@ -233,7 +230,7 @@ impl Log {
 }
 
 /// The reports of a file, and the length of the sound part of it.
-fn read(path: &Path, file: File, header: &Header) -> Result<(Vec<Report>, u64), ResultsError> {
+fn read(path: &Path, file: &File, header: &Header) -> Result<(Vec<Report>, u64), ResultsError> {
     let mut reader = BufReader::new(file);
     let mut reports = Vec::new();
     let (mut text, mut number, mut length) = (String::new(), 0, 0);
@@ -462,6 +459,21 @@ mod tests {
         assert!(!Log::is_begun(&folder.path().join("missing")) && !Log::is_begun(folder.path()));
         drop(Log::open(&folder.path().join("delay-1"), &header("torch"), false).unwrap());
         assert!(Log::is_begun(folder.path()) && Log::is_begun(&folder.path().join("delay-1")));
+    }
+
+    /// The change that makes it fail: `Log::open` without the lock.
+    #[test]
+    fn results_that_another_program_writes_are_left_to_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let made = fixtures::results(&[1]).reports;
+        let (mut log, _) = Log::open(folder.path(), &header("torch"), false).unwrap();
+        for resume in [false, true] {
+            let second = Log::open(folder.path(), &header("torch"), resume).err().unwrap().to_string();
+            assert!(second.contains("another program writes it"), "{second}");
+        }
+        made[..2].iter().for_each(|report| log.add(report).unwrap());
+        drop(log);
+        assert_eq!(Log::open(folder.path(), &header("torch"), true).unwrap().1, made[..2]);
     }
 
     /// The change that makes it fail: `Log::open`, which cuts off the line that another program is writing.

@@ -120,12 +120,6 @@ impl Point {
         }
     }
 
-    /// The arms, by their seeds, of which every demonstration has a count.
-    #[must_use]
-    pub fn arms(&self) -> &[u64] {
-        &self.arms
-    }
-
     /// Mean of a mode with its interval; of one arm and one demonstration the count alone.
     pub fn interval(&self, mode: Mode) -> Option<Interval> {
         let (_, counts) = self.held.iter().find(|(held, _)| *held == mode)?;

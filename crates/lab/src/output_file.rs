@@ -189,6 +189,17 @@ pub fn apart<'a>(targets: impl IntoIterator<Item = &'a Path>) -> Result<(), Outp
     Ok(())
 }
 
+/// Keeps a log for this program until it is closed: two programs at one would each cut off the other's lines.
+///
+/// # Errors
+/// [`io::ErrorKind::ResourceBusy`] if another program writes it, or the operating system's reason.
+pub fn lock(log: &File) -> io::Result<()> {
+    log.try_lock().map_err(|cause| match cause {
+        TryLockError::WouldBlock => io::Error::new(io::ErrorKind::ResourceBusy, "another program writes it"),
+        TryLockError::Error(cause) => cause,
+    })
+}
+
 /// A log that grows at its place, so that others can read it meanwhile.
 ///
 /// # Errors
@@ -196,11 +207,7 @@ pub fn apart<'a>(targets: impl IntoIterator<Item = &'a Path>) -> Result<(), Outp
 pub fn create_log(target: &Path, force: bool, inputs: &[&Path]) -> Result<File, OutputError> {
     let (place, _) = may_write(target, force, inputs)?;
     let opened = OpenOptions::new().write(true).create(true).truncate(false).open(place).and_then(|file| {
-        // Two programs at one log would each write over the other's lines.
-        file.try_lock().map_err(|cause| match cause {
-            TryLockError::WouldBlock => io::Error::new(io::ErrorKind::ResourceBusy, "another program writes it"),
-            TryLockError::Error(cause) => cause,
-        })?;
+        lock(&file)?;
         file.set_len(0)?;
         Ok(file)
     });
