@@ -270,10 +270,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         set |= if run.is_faded(primitive) { flags::FEEDBACK_FADED } else { 0 };
         set |= if operational.is_clamped() { flags::CLAMPED } else { 0 };
         let free = senses == Senses::Fresh && drift.is_free() && !self.cut.is_cut();
-        if options.compliant && self.hand.is_gripping() {
-            settling.fade();
-        } else if options.compliant && free {
-            settling.step(&tracking.stiffness, measured.state, &reference, |joint| handover.fall(joint));
+        if options.compliant {
+            if self.hand.is_gripping() {
+                settling.fade();
+            } else if free {
+                settling.step(&tracking.stiffness, measured.state, &reference, |joint| handover.fall(joint));
+            } else if drift.is_touched() {
+                settling.give_way(pressing);
+            }
         }
         torque.0 += handover.step() + settling.torque();
         *lag = Lag::new(&(task.pose.position - measured.pose.position), operational.lag());

@@ -10,13 +10,15 @@
 //! * within 1.5 times the friction of the model: an obstacle that no sensor feels is pressed with that much more, and
 //!   no more with time.
 //!
-//! The caller leaves it as it is while something is touched: there the feedback decides how hard. Once the hand grips,
-//! it fades: with what it holds the arm turns round, and friction with it.
+//! While something is touched it grows no more: there the feedback decides how hard. From a touch on, the torque of a
+//! joint that presses against what the sensor measures is given up, because friction that was made up for along a plan
+//! is not there once the plan is stopped. Once the hand grips, it fades: with what it holds the arm turns round, and
+//! friction with it.
 
 use crate::law::integral::TOLERANCE;
 use crate::model::wam7;
 use crate::plan::reference::JointReference;
-use crate::real::{Real, within};
+use crate::real::{Real, at_least, at_most, within};
 use crate::sense::joints::JointState;
 use crate::time::PERIOD;
 use crate::units::{JOINTS, Vector7};
@@ -41,6 +43,10 @@ const FULL: f64 = 0.02;
 
 /// Time constant with which it fades in a grip (s): gone before the hand lifts what it has closed on.
 const FADING: f64 = 0.5;
+
+/// Torque that is given up for each N m s of force control against it (1/s): all of J1's within a tenth of a second of
+/// a touch with 1 N.
+const YIELDING: f64 = 30.0;
 
 /// Control periods between two turns of a joint: in a run there is no time for all joints in one.
 const TURNS: f64 = JOINTS as f64;
@@ -69,6 +75,20 @@ impl<R: Real> Settling<R> {
     pub fn fade(&mut self) {
         let joint = self.take_turn();
         self.torque[joint] *= R::constant(1.0 - TURNS * PERIOD / FADING);
+    }
+
+    /// One control period in touch with something, in turns as well, `pressing` the torque of Eq (12) (N m). A joint
+    /// whose torque is against it gives way, at most all of what it has.
+    #[inline(never)]
+    pub fn give_way(&mut self, pressing: &Vector7<R>) {
+        let joint = self.take_turn();
+        let (torque, zero) = (self.torque[joint], R::constant(0.0));
+        let left = torque + pressing[joint] * R::constant(YIELDING * TURNS * PERIOD);
+        if torque > zero {
+            self.torque[joint] = at_most(at_least(left, zero), torque);
+        } else {
+            self.torque[joint] = at_least(at_most(left, zero), torque);
+        }
     }
 
     /// Returns the joint whose turn it is.
@@ -219,6 +239,25 @@ mod tests {
         }
         let left = settling.torque().component_div(&Vector7::from(CLAMP));
         assert!(left.iter().all(|share| (0.02..0.06).contains(share)), "{left}");
+    }
+
+    /// The torque once every joint has had its turn in touch with something.
+    fn given_way(settling: &mut Settling<f64>, pressing: f64) -> Vector7<f64> {
+        (0..JOINTS).for_each(|_| settling.give_way(&Vector7::repeat(pressing)));
+        *settling.torque()
+    }
+
+    #[test]
+    fn what_presses_against_force_control_is_given_up_and_nothing_else() {
+        for sign in [1.0, -1.0] {
+            let all = Vector7::from(CLAMP) * sign;
+            let mut settling = Settling { torque: all, turn: 0 };
+            assert_eq!(given_way(&mut settling, 0.1 * sign), all, "it presses where the force goes");
+            let left = (Vector7::from(CLAMP).add_scalar(-0.1 * YIELDING * TURNS * PERIOD)).map(|left| left.max(0.0));
+            assert!((given_way(&mut settling, -0.1 * sign) - left * sign).amax() < 1e-12, "{}", settling.torque);
+            assert_eq!(given_way(&mut settling, -1e6 * sign), Vector7::zeros(), "it never turns round");
+            assert_eq!(given_way(&mut settling, -1e6 * sign), Vector7::zeros(), "it never begins");
+        }
     }
 
     #[test]

@@ -70,6 +70,11 @@ impl<R: Real> Drift<R> {
         self.quiet >= QUIET
     }
 
+    /// True from a touch on, until the deviation has been small for a while.
+    pub fn is_touched(&self) -> bool {
+        self.touched
+    }
+
     /// Takes the deviation of this control period (N, N m, sensor axes); returns the change of the tare.
     pub fn step(&mut self, deviation: &Vector6<R>) -> Vector6<R> {
         // What deviates when the run begins has not come fast.
