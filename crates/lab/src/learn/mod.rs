@@ -10,6 +10,7 @@ pub mod feedback;
 mod fit;
 pub mod hand;
 pub mod memory;
+mod range;
 pub mod report;
 
 use std::path::{Path, PathBuf};
@@ -205,6 +206,7 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
             vec![DEFAULT_POSTURE; demonstration.len()]
         }
     };
+    warnings.extend(range::warnings(&posture));
     warnings.extend(moving_ends(&demonstration.speed()));
     warnings.extend(options.hand.warnings(recording, demonstration.trimmed));
     if demonstration.pose_source == PoseSource::JointAngles && recording.position.is_some() {
