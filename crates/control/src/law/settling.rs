@@ -44,8 +44,8 @@ const FULL: f64 = 0.02;
 /// Time constant with which it fades in a grip (s): gone before the hand lifts what it has closed on.
 const FADING: f64 = 0.5;
 
-/// Torque that is given up for each N m s of force control against it (1/s): all of J1's within a tenth of a second of
-/// a touch with 1 N.
+/// Torque that is given up for each N m s of force control against it (1/s): 0.75 N m against J1 take all that it can
+/// have within a tenth of a second.
 const YIELDING: f64 = 30.0;
 
 /// Control periods between two turns of a joint: in a run there is no time for all joints in one.
