@@ -10,7 +10,7 @@ use pinned_init::{Init, init};
 
 use crate::law::window::Window;
 use crate::model::kinematics::Jacobian;
-use crate::real::{Real, at_least, at_most, sqrt};
+use crate::real::{Real, at_most, sqrt};
 use crate::time::{PERIOD, periods};
 use crate::units::{JointTorques, Vector6};
 
@@ -21,30 +21,34 @@ pub const WINDOW_CAPACITY: usize = periods(0.5) as usize;
 /// something presses back: a run that expects to press on what is not there would else throw the arm (30 N: 1.7 m/s).
 const UNCONFIRMED: [f64; 2] = [5.0, 0.5];
 
-/// Fastest rise of what counts as pressing back (N/s, N m/s). A guard, not measured: the sensor also feels the inertia
-/// of the hand, which "presses back" while the hand is thrown. The rig of the tests has no such inertia in its sensor.
+/// Most that may be applied along a push, in parts of the push, beyond `UNCONFIRMED`. It is the gain of Eq (12) at rest
+/// in a compliant run, `P + K_i Dt`: nothing presses back on a hand that gives way (decision 0131).
+const GIVING: f64 = 5.0;
+
+/// Fastest rise of what counts as confirmed (N/s, N m/s). A guard, not measured: the sensor also feels the inertia of
+/// the hand, which "presses back" while the hand is thrown. The rig of the tests has no such inertia in its sensor.
 const CONFIRMATION: [f64; 2] = [20.0, 2.0];
 
 /// Eq (12).
 #[derive(Clone, Debug)]
 pub struct ForceController<R: Real> {
     window: Window<R, 6, WINDOW_CAPACITY>,
-    /// Force and torque (N, N m) with which the environment presses back; `None` before the first cycle, when the arm
-    /// rests and what is measured is a load.
-    pressing: Option<[R; 2]>,
+    /// Force and torque (N, N m) that the environment confirms; `None` before the first cycle, when the arm rests and
+    /// what is measured is a load.
+    confirmed: Option<[R; 2]>,
 }
 
 impl<R: Real> ForceController<R> {
     /// Makes, in its place, a controller with an empty window of `length` control periods (kept within 1 and
     /// [`WINDOW_CAPACITY`]).
     pub fn init(length: usize) -> impl Init<Self> {
-        init!(ForceController { window <- Window::init(length), pressing: None })
+        init!(ForceController { window <- Window::init(length), confirmed: None })
     }
 
     /// Empties the window and gives it `length` control periods.
     pub fn restart(&mut self, length: usize) {
         self.window.restart(length);
-        self.pressing = None;
+        self.confirmed = None;
     }
 
     /// The command `-(P e + K_i dt sum e)` in the axes of the error (N, N m), world axes for
@@ -59,25 +63,27 @@ impl<R: Real> ForceController<R> {
     }
 
     /// The wrench that is to be applied (world axes), its force and its torque cut to what the environment presses back
-    /// along them, as the sensor measures it, and `UNCONFIRMED` beyond that; their directions are kept.
+    /// along them, as the sensor measures it, or to `GIVING` times what it pushes along them, and `UNCONFIRMED` beyond
+    /// that; their directions are kept.
     pub fn confirmed(&mut self, wanted: &Vector6<R>, measured: &Vector6<R>) -> Vector6<R> {
-        let (mut confirmed, zero) = (*wanted, R::constant(0.0));
-        let before = self.pressing.map_or([None; 2], |before| before.map(Some));
+        let (mut applied, zero) = (*wanted, R::constant(0.0));
+        let before = self.confirmed.map_or([None; 2], |before| before.map(Some));
         let rows =
-            self.pressing.insert([zero; 2]).iter_mut().zip(before).zip(UNCONFIRMED).zip(CONFIRMATION).zip([0, 3]);
-        for ((((pressing, before), unconfirmed), rise), first) in rows {
-            let mut part = confirmed.fixed_rows_mut::<3>(first);
+            self.confirmed.insert([zero; 2]).iter_mut().zip(before).zip(UNCONFIRMED).zip(CONFIRMATION).zip([0, 3]);
+        for ((((confirmed, before), unconfirmed), rise), first) in rows {
+            let mut part = applied.fixed_rows_mut::<3>(first);
             let (length, unconfirmed) = (sqrt(part.dot(&part)), R::constant(unconfirmed));
             if length > unconfirmed {
-                let reaction = at_least(-part.dot(&measured.fixed_rows::<3>(first)) / length, zero);
-                *pressing = before.map_or(reaction, |before| at_most(reaction, before + R::constant(rise * PERIOD)));
-                let most = *pressing + unconfirmed;
+                let push = part.dot(&measured.fixed_rows::<3>(first)) / length;
+                let now = if push > zero { push * R::constant(GIVING) } else { -push };
+                *confirmed = before.map_or(now, |before| at_most(now, before + R::constant(rise * PERIOD)));
+                let most = *confirmed + unconfirmed;
                 if length > most {
                     part *= most / length;
                 }
             }
         }
-        confirmed
+        applied
     }
 
     /// Joint torque of a command in world axes: `J^T u`.

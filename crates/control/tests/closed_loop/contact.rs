@@ -397,3 +397,45 @@ fn b8_a_hand_that_gives_way_to_a_moment_rests_at_the_limit_of_its_wrist_and_is_n
         assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Run, Fault::None));
     }
 }
+
+/// Way of the hand of a compliant arm without friction after two seconds of this push along x (m), and the fastest
+/// speed of the hand once the push has ended (m/s).
+fn given_way(push: f64, force_control: bool) -> (f64, f64) {
+    let mut rig = Rig::<f32>::new(START, 1);
+    (rig.plant.coulomb, rig.plant.viscous) = (rig.plant.coulomb * 0.0, rig.plant.viscous * 0.0);
+    rig.command(Command::Hold);
+    rig.run_for(2.0);
+    rig.command(Command::Tare);
+    let design =
+        Design { expected: Some([0.0; 6]), duration: 8.0, start: START, goal: START, bent: false, ..Design::default() };
+    rig.load(&primitive(&design)).expect("loads");
+    let pose_feedback = control::PoseFeedback::Planned;
+    let options = RunOptions { compliant: true, feedback: false, pose_feedback, ..RunOptions::default() };
+    rig.command(Command::Run(RunOptions { force_control, ..options }));
+    rig.run_for(1.0);
+    let before = rig.plant.frames().tool_pose().position.x;
+    rig.plant.push[0] = push;
+    rig.run_for(2.0);
+    let way = rig.plant.frames().tool_pose().position.x - before;
+    rig.plant.push[0] = 0.0;
+    let mut fastest = 0.0f64;
+    for _ in 0..periods(2.0) {
+        rig.tick(None);
+        fastest = fastest.max(rig.plant.frames().jacobian().twist(&rig.plant.dq).fixed_rows::<3>(0).norm());
+    }
+    assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Run, Fault::None));
+    (way * push.signum(), fastest)
+}
+
+/// The gain at rest is 5, so a push of 2 N and the 8 N that are the most bend the spring five times as far as the push
+/// alone, less a dead band. The change that makes it fail: what gives way is cut as what presses on nothing, 3.1 and
+/// 3.4 times.
+#[test]
+fn force_control_gives_way_with_its_whole_gain_and_does_not_throw_the_hand_once_the_push_has_ended() {
+    for (push, times) in [(1.0, 4.0), (-1.0, 4.0), (2.0, 3.8), (-2.0, 4.5), (3.0, 2.7), (-3.0, 3.3)] {
+        let ((with, fastest), (without, spring)) = (given_way(push, true), given_way(push, false));
+        println!("{push} N: {with:.4} m and {fastest:.3} m/s, without {without:.4} m and {spring:.3} m/s");
+        assert!(with > times * without, "{push} N: {with} m, the spring alone {without} m");
+        assert!(fastest < 0.5, "{push} N: {fastest} m/s");
+    }
+}
