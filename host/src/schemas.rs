@@ -1,6 +1,6 @@
 //! JSON schemas of what commands write with `--json`, made from the very types that are written.
 //!
-//! `docs/schemas` holds them as files; `UPDATE_DOCUMENTS=1 cargo test -p tactus --test schemas` writes these.
+//! `docs/schemas` holds them as files; `UPDATE_DOCUMENTS=1 cargo test -p tactus --test command schemas::` writes these.
 
 use lab::failure::FailureData;
 use schemars::generate::SchemaSettings;

@@ -1,14 +1,13 @@
 //! Advice works: what a refusal advises shows or mends the same refusal, and what a command drops it says.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+
+use crate::common;
 
 const DEVICE: &str = "--device sil:world=simple,flash=arm.flash --non-interactive";
 

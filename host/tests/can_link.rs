@@ -1,8 +1,5 @@
 //! The link over a CAN bus: the same upload and the same run as over the serial line, at the speed of the line.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::Path;
 use std::time::Duration;
 
@@ -21,6 +18,8 @@ use link::frame::{self, Envelope, FRAME_BYTES};
 use link::message::{CHUNK_BYTES, ChunkData};
 use link::{Name, Request, RunOptions, Telemetry};
 use puck::{CanFrame, CanId};
+
+use crate::common;
 
 /// A primitive with as many kernels as a device takes: the longest upload there is.
 fn primitive(folder: &Path, kernels: &str) -> PrimitiveFile {

@@ -1,8 +1,5 @@
 //! `tactus can` on logs of simulated arms, of the golden transcripts, and of nobody.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -11,6 +8,8 @@ use assert_cmd::assert::Assert;
 use canlog::{BusKind, InterfaceTotals, Kind, LogLine, Reader};
 use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::common;
 
 fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
     Command::new(env!("CARGO_BIN_EXE_tactus"))

@@ -1,12 +1,11 @@
 //! The lines of careless people: nothing is lost, and what is wrong is named, for people and for scripts.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::Value;
+
+use crate::common;
 
 const DEVICE: &str = "--device sil:world=simple --non-interactive";
 

@@ -1,8 +1,5 @@
 //! Checking: what an arm can do passes, what it cannot do is refused with the limit, the joint and the time.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::Path;
 
 use lab::demonstration::{Preparation, Recording};
@@ -11,6 +8,8 @@ use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
 use lab::procedure::{Change, ChangeKind};
 use link::Goal;
 use tactus::check::{CheckReport, Course, Limit, check};
+
+use crate::common;
 
 fn reach(duration: f64) -> PrimitiveFile {
     let text = common::text(&common::rows(duration));

@@ -1,13 +1,12 @@
 //! The commands as a user or a script sees them: exit codes, what is said where, JSON.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::Path;
 
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use serde_json::Value;
+
+use crate::common;
 
 fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
     Command::new(env!("CARGO_BIN_EXE_tactus"))

@@ -1,8 +1,5 @@
 //! A full disk, a closed pipe, an interrupt and a kill at every stage of every command that writes a file.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
@@ -10,6 +7,8 @@ use std::time::{Duration, Instant};
 
 use clap::CommandFactory;
 use tactus::cmd::Cli;
+
+use crate::common;
 
 /// A command that writes a file: subcommand, the option that names it, the whole line, and the file. It begins with
 /// `reach.toml`, `run.csv` and a device whose flash holds `reach`, and takes the place of a file that is there already.

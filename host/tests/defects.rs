@@ -1,6 +1,7 @@
 //! `docs/defects.md`: what a new user found wrong by trying the tool, and the tests that fail if it comes back.
 //!
-//! A test is named here by its function. After a change: `UPDATE_DOCUMENTS=1 cargo test -p tactus --test defects`.
+//! A test is named here by its function. After a change:
+//! `UPDATE_DOCUMENTS=1 cargo test -p tactus --test command defects::`.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -223,5 +224,5 @@ fn every_defect_has_tests_that_exist_and_the_document_names_them() {
         std::fs::write(&path, &text).unwrap();
     }
     let found = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(found == text, "UPDATE_DOCUMENTS=1 cargo test -p tactus --test defects mends it");
+    assert!(found == text, "UPDATE_DOCUMENTS=1 cargo test -p tactus --test command defects:: mends it");
 }

@@ -1,16 +1,13 @@
 //! `tactus faults`: the last second before a fault, read from beside, after the clear, and on paper.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-#[path = "common/served_arm.rs"]
-mod served_arm;
-
 use std::path::Path;
 
 use control::{Fault, RATE_HZ, State};
 use lab::fault_guide::FaultGuide;
 use serde_json::Value;
-use served_arm::{Arm, tactus};
+
+use crate::common;
+use crate::served_arm::{Arm, tactus};
 
 /// The replies of one puck are lost for 50 ms, 1.5 s after the first torque: on the way to the start of the movement.
 const SCRIPT: &str = "

@@ -1,16 +1,15 @@
 //! `docs/cli.md`: the twenty features that the command line tool shall have, with the tests that hold them.
 //!
 //! A test whose name begins with `cli_N_` is a proof of row N, in whatever crate it is. After a change of the rows or
-//! of such names: `UPDATE_DOCUMENTS=1 cargo test -p tactus --test features` writes the document anew.
-
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
+//! of such names: `UPDATE_DOCUMENTS=1 cargo test -p tactus --test command features::` writes the document anew.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Output, Stdio};
 use std::time::{Duration, Instant};
+
+use crate::common;
 
 /// A feature: name, commands, bar, and what is still missing (empty: held).
 type Feature = (&'static str, &'static str, &'static str, &'static str);
@@ -175,7 +174,10 @@ fn the_table_of_features_is_what_the_tests_hold() {
     }
     let found = std::fs::read_to_string(&path).unwrap();
     let differs = found.lines().zip(text.lines()).find(|(found, text)| found != text);
-    assert!(found == text, "UPDATE_DOCUMENTS=1 cargo test -p tactus --test features mends it; first: {differs:?}");
+    assert!(
+        found == text,
+        "UPDATE_DOCUMENTS=1 cargo test -p tactus --test command features:: mends it; first: {differs:?}"
+    );
 }
 
 fn command(folder: &Path, line: &str) -> std::process::Command {

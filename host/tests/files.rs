@@ -1,14 +1,13 @@
 //! Files: nothing that existed is damaged, and what was recorded is kept, whatever ends a command.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
+
+use crate::common;
 
 /// The program, in a folder, without a device of the environment.
 fn tactus(folder: &Path, line: &str) -> Assert {

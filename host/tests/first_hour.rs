@@ -1,12 +1,11 @@
 //! A newcomer's first hour: words that mislead, files that are left lying about, and logs that end too early.
 #![cfg(unix)]
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
+
+use crate::common;
 
 fn command(folder: &Path, line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));

@@ -1,18 +1,16 @@
 //! `tactus flash` and `tactus logs`, with a stand-in for probe-rs that writes down what it was asked to do.
 #![cfg(unix)]
 
-#[path = "../../crates/lab/tests/elf/mod.rs"]
-mod elf;
-
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
-use elf::{elf, real};
 use link::ImageMetadata;
 use link::metadata::MemoryRegion;
+
+use crate::elf::{elf, real};
 
 /// A folder with an image and, if `status` is given, a probe-rs that ends with it.
 fn laboratory(image: &[u8], status: Option<u8>) -> tempfile::TempDir {

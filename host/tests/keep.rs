@@ -1,13 +1,12 @@
 //! A run leaves a folder with everything about it, whatever its end, and one that does not move leaves none.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use serde_json::Value;
+
+use crate::common;
 
 fn tactus(folder: &Path, line: &str) -> Assert {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));

@@ -1,8 +1,5 @@
 //! The library of a device by command, and looking on beside a run: over a socket and in real time.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
@@ -11,6 +8,8 @@ use std::time::{Duration, Instant};
 
 use control::RATE_HZ;
 use serde_json::Value;
+
+use crate::common;
 
 fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));

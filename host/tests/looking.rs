@@ -1,12 +1,11 @@
 //! Commands that only tell: reports of runs, the meaning of codes, completions. None of them needs a device.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::Path;
 
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
+
+use crate::common;
 
 fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
     Command::new(env!("CARGO_BIN_EXE_tactus"))

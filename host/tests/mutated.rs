@@ -2,12 +2,11 @@
 //!
 //! `TACTUS_MUTATIONS=2000` runs the full count.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
+
+use crate::common;
 
 /// Damaged files that are tried unless the environment says otherwise.
 const FEW: u64 = 60;

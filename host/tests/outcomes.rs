@@ -1,13 +1,12 @@
 //! "Ok" is true: a command that ends with 0 did what was asked, and one that did not says by how much.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::Path;
 
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use serde_json::Value;
+
+use crate::common;
 
 fn tactus(folder: &Path, line: &str) -> Assert {
     let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));

@@ -14,7 +14,7 @@ fn cli_13_the_schema_files_are_those_of_the_types_and_nothing_else_is_there() {
             std::fs::write(folder.join(&file), &text).unwrap();
         }
         let found = std::fs::read_to_string(folder.join(&file)).unwrap_or_default();
-        assert!(found == text, "{file} is old: UPDATE_DOCUMENTS=1 cargo test -p tactus --test schemas");
+        assert!(found == text, "{file} is old: UPDATE_DOCUMENTS=1 cargo test -p tactus --test command schemas::");
         names.push(file);
     }
     let mut found: Vec<String> =

@@ -1,12 +1,11 @@
 //! An image that a device's flash has lost is told by `tactus list` and `tactus status`, and an upload brings it back.
 
-#[path = "../../crates/lab/tests/common/mod.rs"]
-mod common;
-
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use serde_json::{Value, json};
+
+use crate::common;
 
 const DEVICE: &str = "--device sil:world=simple,flash=arm.flash --non-interactive";
 

@@ -1,12 +1,10 @@
 //! `tactus tare`: a sensor that has drifted gets its zero again, a load does not become one unasked.
 
-#[path = "common/served_arm.rs"]
-mod served_arm;
-
 use std::path::Path;
 
 use serde_json::Value;
-use served_arm::{Arm, tactus};
+
+use crate::served_arm::{Arm, tactus};
 
 #[track_caller]
 fn object(folder: &Path, line: &str, code: i32) -> Value {

@@ -2,14 +2,11 @@
 //! needs.
 #![cfg(unix)]
 
-mod elf;
-
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use elf::{elf, real};
 use lab::output_file::OutputError;
 use lab::simulation::{
     BoardCan, BoardEngine, Engine, FlashSource, Simulation, SimulationError, SimulationOptions, WorldKind,
@@ -18,6 +15,8 @@ use lab::transport::can::CanPort;
 use lab::transport::{Cancellation, ChipOptions, LineKind, Transport};
 use link::ImageMetadata;
 use sim::lockstep::REPLY_LENGTH;
+
+use crate::elf::{elf, real};
 
 /// The shell command that writes a request of this kind at this tick, with link bytes.
 fn request(kind: u8, tick: u64, link: &[u8]) -> String {

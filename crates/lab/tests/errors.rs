@@ -1,6 +1,6 @@
 //! `docs/errors.md` is what the table of errors, the refusals and the faults say.
 //!
-//! After a change of those: `UPDATE_DOCUMENTS=1 cargo test -p lab --test errors` writes the document anew.
+//! After a change of those: `UPDATE_DOCUMENTS=1 cargo test -p lab --test library errors::` writes the document anew.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -55,5 +55,8 @@ fn the_document_of_errors_is_what_the_tables_say() {
     }
     let found = std::fs::read_to_string(&path).expect("docs/errors.md");
     let differs = found.lines().zip(expected.lines()).find(|(found, expected)| found != expected);
-    assert!(found == expected, "UPDATE_DOCUMENTS=1 cargo test -p lab --test errors mends it; first: {differs:?}");
+    assert!(
+        found == expected,
+        "UPDATE_DOCUMENTS=1 cargo test -p lab --test library errors:: mends it; first: {differs:?}"
+    );
 }

@@ -1,7 +1,5 @@
 //! Recordings as MCAP: read back with the crate that reads such files.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -9,6 +7,8 @@ use lab::demonstration::Recording;
 use lab::export;
 use mcap::MessageStream;
 use serde_json::Value;
+
+use crate::common;
 
 fn exported(text: &str) -> (Recording, Vec<u8>) {
     let recording = Recording::parse(Path::new("run.csv"), text.as_bytes()).unwrap();

@@ -1,7 +1,5 @@
 //! Learning: a demonstration becomes a primitive that does the same, a file that reads back as it was, and an image.
 
-mod common;
-
 use std::path::Path;
 
 use lab::demonstration::{Preparation, Recording};
@@ -10,6 +8,8 @@ use lab::learn::{LearnError, LearnOptions, Learned, hand::HandMotion, learn};
 use lab::primitive_file::{
     ExpectationTable, FeedbackTables, OrientationError, PrimitiveFile, PrimitiveFileError, StatisticsTable,
 };
+
+use crate::common;
 
 /// The plan has to end this near to its goal, m: the bound of `tactus check`.
 const GOAL_DISTANCE: f64 = 3e-3;

@@ -1,11 +1,11 @@
 //! Learning at another speed than the movement was shown at.
 
-mod common;
-
 use std::path::Path;
 
 use lab::demonstration::Recording;
 use lab::learn::{LearnError, LearnOptions, Learned, learn};
+
+use crate::common;
 
 fn taught(duration: f64) -> Recording {
     let text = common::text(&common::rows(duration));

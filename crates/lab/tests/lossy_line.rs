@@ -1,7 +1,5 @@
 //! Procedures on a line that loses what the device says once, and beside others who stop the arm.
 
-mod common;
-
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -18,6 +16,8 @@ use lab::transport::{Transport, TransportError};
 use link::frame::{Decoder, Envelope, FRAME_BYTES, Frame, encode};
 use link::{Event, EventKind, HandStage, Name, Reply, Request, RunOptions};
 use sim::{PendantAction, TICKS_PER_SECOND};
+
+use crate::common;
 
 /// The session of somebody else, who only stops.
 const OTHERS: u16 = 7;

@@ -1,11 +1,11 @@
 //! Recordings: what is wrong is named with file, line and column; what is right comes back as it was.
 
-mod common;
-
 use std::path::Path;
 
 use control::time::periods;
 use lab::demonstration::{Demonstration, DemonstrationError, Preparation, Recording, RecordingError, layout};
+
+use crate::common;
 
 const FILE: &str = "folder/demo.csv";
 
@@ -481,6 +481,10 @@ fn the_table_of_the_document_is_the_layout() {
     if std::env::var_os("UPDATE_DOCUMENTS").is_some() {
         std::fs::write(&path, [&document[..start], &table, &document[end..]].concat()).unwrap();
     } else {
-        assert_eq!(document[start..end], table, "UPDATE_DOCUMENTS=1 cargo test -p lab --test recording mends it");
+        assert_eq!(
+            document[start..end],
+            table,
+            "UPDATE_DOCUMENTS=1 cargo test -p lab --test library recording:: mends it"
+        );
     }
 }

@@ -1,7 +1,5 @@
 //! Remembering: recordings of rehearsals become an expectation and weights, recordings of successes become statistics.
 
-mod common;
-
 use std::path::Path;
 
 use control::{State, flags};
@@ -10,6 +8,8 @@ use lab::learn::memory::{MemoryError, Payload, remember_rehearsals, remember_suc
 use lab::learn::{LearnOptions, learn};
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
 use link::Telemetry;
+
+use crate::common;
 
 const DURATION: f64 = 5.0;
 

@@ -1,7 +1,5 @@
 //! The page about runs: what a stranger reads in it, and that it needs nothing but itself.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
 use control::{Fault, State, flags};
@@ -9,6 +7,8 @@ use lab::demonstration::Recording;
 use lab::learn::{LearnOptions, learn};
 use lab::primitive_file::{ExpectationTable, PrimitiveFile};
 use lab::report::{Outcome, ReportedRun, page};
+
+use crate::common;
 
 /// A run of 4 s between two rests; what comes behind its samples is in this state, with this fault.
 fn recorded(folder: &Path, name: &str, end: Option<(State, Fault)>) -> PathBuf {

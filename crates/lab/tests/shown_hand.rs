@@ -1,11 +1,11 @@
 //! `learn` tells of a hand that was shown otherwise than the primitive holds it.
 
-mod common;
-
 use std::path::Path;
 
 use lab::demonstration::Recording;
 use lab::learn::{LearnOptions, hand::HandMotion, learn};
+
+use crate::common;
 
 /// The change that makes it fail: what the recording tells of the hand is passed over, as its fingers are not learned.
 #[test]

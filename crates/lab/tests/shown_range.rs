@@ -1,12 +1,12 @@
 //! `learn` tells of joints that were shown where the arm may not be.
 
-mod common;
-
 use std::f32::consts::TAU;
 use std::path::Path;
 
 use lab::demonstration::Recording;
 use lab::learn::{LearnOptions, learn};
+
+use crate::common;
 
 /// The change that makes it fail: `learn` without the warnings of the joints' range. Only `check` refused it then.
 #[test]

@@ -1,11 +1,10 @@
 //! Faults that are ordered: each does what its line in the table says, when it says, and no longer.
 
-mod common;
-
-use common::Master;
 use puck::{Counts, Node, Property, PropertyId};
 use sim::fault::{FaultKind, FrameKind, Frames, Injection};
 use sim::{OperatorConfig, PendantAction, PlantConfig};
+
+use crate::common::Master;
 
 /// An arm that is up, with these faults from now on; the operator leaves it alone.
 fn befallen(what: FaultKind, at: f64, lasts: f64) -> Master {

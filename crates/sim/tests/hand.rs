@@ -1,14 +1,14 @@
 //! The hand as the master sees it: waking, HI, torques, positions, gauges.
 
-mod common;
-
-use common::{Master, motor_id};
 use puck::hand::{HandCommand, HandCommander, angles};
 use puck::{
     CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, PuckTorque, Reply,
     Request, Role, get, packed_torques, set,
 };
 use sim::{FingerObstacle, FreeJoints, HOME, HandConfig, HandTargets, PlantConfig, TICKS_PER_MILLISECOND, ticks};
+
+use crate::common;
+use crate::common::{Master, motor_id};
 
 /// A hand whose fingers stand half closed before anybody has initialised it.
 fn half_closed() -> HandTargets {

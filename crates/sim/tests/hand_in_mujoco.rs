@@ -2,12 +2,12 @@
 //! object.
 #![cfg(feature = "mujoco")]
 
-mod common;
-
-use common::{Master, motor_id};
 use puck::{Group, MotorMode, Node, Property, PropertyId, PuckTorque, packed_torques, set};
 use sim::world::mujoco::{MujocoOptions, MujocoWorld};
 use sim::{HandState, OperatorConfig, PlantConfig};
+
+use crate::common;
+use crate::common::{Master, motor_id};
 
 /// A started arm in the default scene, its hand in torque mode.
 fn torque_mode() -> Master {

@@ -1,12 +1,11 @@
 //! Time: whoever looks when, the same things happen; and what was decided stays decided.
 
-mod common;
-
-use common::{Master, SLOT_TICKS};
 use proptest::prelude::*;
 use puck::{CanFrame, Group, Node, PropertyId, PuckTorque, get, packed_torques, set};
 use sim::{BusTrace, FreeJoints, HOME, Plant, PlantConfig, Ticks, World};
 use std::any::Any;
+
+use crate::common::{Master, SLOT_TICKS};
 
 /// Torques that change from cycle to cycle.
 fn torques(slot: u32) -> CanFrame {

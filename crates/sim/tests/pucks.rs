@@ -1,8 +1,5 @@
 //! Motor pucks and force/torque sensor as the master sees them.
 
-mod common;
-
-use common::{Master, home_counts, motor_id, safety_id};
 use puck::{
     CanFrame, CanId, Counts, Destination, Group, Node, Property, PropertyId, PuckTorque, Reply, SafetyMode,
     force_torque, get, packed_torques, set, set_short,
@@ -11,6 +8,8 @@ use sim::{
     FreeJoints, HOME, OperatorConfig, PendantAction, PlantConfig, SafetyConfig, TICKS_PER_MICROSECOND,
     TICKS_PER_MILLISECOND,
 };
+
+use crate::common::{Master, home_counts, motor_id, safety_id};
 
 fn awake() -> Master {
     let mut master = Master::new(PlantConfig::default());

@@ -1,13 +1,12 @@
 //! The safety module: who may raise the mode, and what brings it down.
 
-mod common;
-
-use common::{Master, home_counts, motor_id, safety_id};
 use puck::safety::Health;
 use puck::{
     CanFrame, Group, Node, PendantState, Property, PropertyId, PuckTorque, SafetyMode, get, packed_torques, set,
 };
 use sim::{OperatorConfig, PendantAction, PlantConfig, TICKS_PER_MILLISECOND};
+
+use crate::common::{Master, home_counts, motor_id, safety_id};
 
 fn active() -> Master {
     let mut master = Master::new(PlantConfig::default());

@@ -1,10 +1,9 @@
 //! Errors of the force/torque sensor: hysteresis, bias, drift, noise, silence.
 
-mod common;
-
-use common::Master;
 use puck::{Node, PropertyId, Reply, force_torque};
 use sim::{ForceTorqueConfig, FreeJoints, PlantConfig, TICKS_PER_MILLISECOND};
+
+use crate::common::Master;
 
 /// A started arm in a weightless world, so that the sensor feels pushes alone.
 fn master(force_torque: ForceTorqueConfig) -> Master {

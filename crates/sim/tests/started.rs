@@ -1,11 +1,11 @@
 //! An arm that was up before the co-controller was switched on, and torques that come late.
 
-mod common;
-
-use common::{CYCLE_TICKS, Master};
 use puck::hand::angles;
 use puck::{Counts, Group, Node, Property, PropertyId, PuckTorque, Reply, SafetyMode, get, packed_torques};
 use sim::{FreeJoints, HOME, HandTargets, OperatorConfig, PendantAction, PlantConfig, SafetyConfig, Ticks, World};
+
+use crate::common;
+use crate::common::{CYCLE_TICKS, Master};
 
 fn started() -> PlantConfig {
     PlantConfig { started: true, operator: OperatorConfig::prompt(), ..PlantConfig::default() }

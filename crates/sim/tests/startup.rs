@@ -1,10 +1,10 @@
 //! The whole way from a cold arm to ACTIVE (docs/barrett-can.md) by a scripted master, frame by frame.
 
-mod common;
-
-use common::{Master, home_counts, safety_id};
 use puck::{Group, Node, Property, PropertyId, PuckTorque, Reply, SafetyMode, force_torque, get, packed_torques, set};
 use sim::{BusTrace, FrameClass, PlantConfig};
+
+use crate::common;
+use crate::common::{Master, home_counts, safety_id};
 
 /// Steps 2 to 16; returns what the arm said about itself on the way.
 fn start_up(master: &mut Master) -> (Vec<u8>, [(i32, i32); 7]) {

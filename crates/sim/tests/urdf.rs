@@ -1,6 +1,6 @@
 //! `model/wam7_bh280.urdf` says what `model/wam7_bh280.xml` says: the arm with sensor and hand, for other programs.
 //!
-//! The file is written from the MuJoCo model: `UPDATE_DOCUMENTS=1 cargo test -p sim --test urdf`.
+//! The file is written from the MuJoCo model: `UPDATE_DOCUMENTS=1 cargo test -p sim --test simulator urdf::`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -228,7 +228,7 @@ fn the_file_is_written_from_the_model() {
         std::fs::write(&file, &text).expect("a writable folder");
     }
     let found = std::fs::read_to_string(&file).unwrap_or_default();
-    assert!(found == text, "{} is old: UPDATE_DOCUMENTS=1 cargo test -p sim --test urdf", file.display());
+    assert!(found == text, "{} is old: UPDATE_DOCUMENTS=1 cargo test -p sim --test simulator urdf::", file.display());
 }
 
 /// MuJoCo reads both files: the same places of the grasp and the same weight, in postures of every joint.

@@ -1,10 +1,11 @@
-//! The house rules that no compiler checks: module circles, sizes, old words, arrows between crates.
+//! The house rules that no compiler checks: module circles, sizes, old words, arrows between crates, files of tests.
 //!
 //! Each rule has a file. `cargo xtask house` prints all findings by rule and file.
 
 mod arrows;
 mod circles;
 mod modules;
+mod programs;
 mod sizes;
 #[cfg(test)]
 mod tests;
@@ -37,11 +38,12 @@ impl Finding {
 type Rule = (&'static str, fn(&[(String, String)]) -> Result<Vec<Finding>>);
 
 /// All rules.
-const RULES: [Rule; 4] = [
+const RULES: [Rule; 5] = [
     ("circles", |files| Ok(circles::check(files))),
     ("sizes", |files| Ok(sizes::check(files))),
     ("words", |files| Ok(words::check(files))),
     ("arrows", arrows::check),
+    ("programs", |files| Ok(programs::check(files))),
 ];
 
 /// Checks one rule, or all of them without a name.
@@ -52,7 +54,7 @@ pub(crate) fn run(only: Option<&str>) -> Result<()> {
     if let Some(name) = only.filter(|name| RULES.iter().all(|(known, _)| known != name)) {
         bail!("no rule '{name}'; there are: {}", RULES.map(|(known, _)| known).join(", "));
     }
-    shell::step("house rules: module circles, sizes, old words, arrows between crates");
+    shell::step("house rules: module circles, sizes, old words, arrows between crates, files of tests");
     let files = files::all(|path| !path.ends_with(".csv") && !path.ends_with(".lock"))?;
     let mut count = 0;
     for (name, check) in RULES.iter().filter(|(name, _)| only.is_none_or(|only| only == *name)) {

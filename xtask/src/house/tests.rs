@@ -1,6 +1,6 @@
 //! Each violation is found, and what is right beside it is not.
 
-use super::{Finding, arrows, circles, sizes, words};
+use super::{Finding, arrows, circles, programs, sizes, words};
 
 fn files(files: &[(&str, &str)]) -> Vec<(String, String)> {
     files.iter().map(|(path, text)| ((*path).to_owned(), (*text).to_owned())).collect()
@@ -122,6 +122,15 @@ fn old_words_are_found_where_they_are_old() {
         ["a.rs:1: doc line opens with 'Whether'; \"True if\" or \"True while\""]
     );
     assert_eq!(check("a.rs", "// What it is\n/// Whatever\n/// Which of them.\nlet a = \"/// What \";"), [""; 0]);
+}
+
+#[test]
+fn a_file_of_tests_that_no_program_has_is_found() {
+    let check = |main: &str, other: &str| lines(programs::check(&files(&[("a/tests/main.rs", main), (other, "")])));
+    assert_eq!(check("mod b;\n", "a/tests/b.rs"), [""; 0]);
+    assert_eq!(check("mod bc;\n", "a/tests/b.rs"), ["a/tests/b.rs: never run: 'mod b;' is not in a/tests/main.rs"]);
+    assert_eq!(check("", "a/tests/common/mod.rs"), [""; 0], "a folder is a module of what names it");
+    assert_eq!(check("", "c/tests/b.rs"), [""; 0], "a program of its own");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Names, units and order of the columns of a recording: one layout to write, two spellings to read.
 //!
 //! The table in `docs/recording-format.md` is written from [`LAYOUT`] by
-//! `UPDATE_DOCUMENTS=1 cargo test -p lab --test recording`.
+//! `UPDATE_DOCUMENTS=1 cargo test -p lab --test library recording::`.
 
 use control::State;
 use link::Telemetry;
