@@ -353,6 +353,18 @@ fn a_place_where_no_arm_can_be_served_is_told_with_those_where_one_can() {
     }
 }
 
+/// The change that makes it fail: the example of the help is always the same.
+#[test]
+fn another_address_than_the_one_that_is_taken_is_advised() {
+    let folder = tempfile::tempdir().unwrap();
+    // Held by this test or by another program: either will do.
+    let taken = std::net::TcpListener::bind("127.0.0.1:29536");
+    let line = "--device sil:world=simple sim --duration 1 --can-only --can 127.0.0.1:29536";
+    let (exit, code, _, help) = refused(folder.path(), line);
+    assert!(exit == 3 && code == "E320" && !help.contains("29536") && help.contains("`--can 127.0.0.1:"), "{help}");
+    drop(taken);
+}
+
 /// Nobody stands beside the arm of the simple world, a served or a real one: a person was asked to guide it.
 #[test]
 fn options_of_the_simulated_teacher_are_refused_where_there_is_none() {

@@ -36,6 +36,19 @@ fn cli_5_a_calm_movement_passes_with_every_margin_reported() {
     assert!(heard.len() > 3 && heard.is_sorted());
 }
 
+/// The change that makes it fail: the times of the plan are those of the taught speed.
+#[test]
+fn every_margin_is_told_at_the_time_of_the_run_at_its_speed() {
+    let primitive = reach(5.0);
+    let reached = |speed: f64| {
+        let report = check(&primitive, &Course::stored(speed), |_| {}).unwrap();
+        assert!(report.margins.iter().all(|margin| margin.time_s <= report.run_duration_s), "{}", report.to_text());
+        report.margins.iter().find(|margin| margin.limit == Limit::Reach).unwrap().time_s
+    };
+    let (taught, twice) = (reached(1.0), reached(2.0));
+    assert!(taught > 0.1 && (twice - taught / 2.0).abs() < 1e-9, "{taught} s and {twice} s");
+}
+
 #[test]
 fn the_position_margin_is_the_distance_to_the_nearer_soft_limit() {
     let report = checked(&reach(5.0));

@@ -221,3 +221,30 @@ fn a_lost_reply_before_or_behind_a_run_is_no_part_of_it() {
     assert!((arrived.duration() - 4.0).abs() < 0.01, "{} s", arrived.duration());
     assert_eq!(arrived.missing, 0);
 }
+
+/// The change that makes it fail: state `coast` without a run is taken for a run.
+#[test]
+fn a_fault_on_the_way_to_the_start_is_named_and_all_that_was_recorded_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows = common::rows(4.0);
+    let last = rows.len() - 1;
+    for (at, row) in rows.iter_mut().enumerate() {
+        let state = match last - at {
+            0 => State::SoftStop,
+            1..6 => State::Coast,
+            _ => State::Approach,
+        };
+        row.telemetry.state = state.code();
+        row.telemetry.fault = if at == last { Fault::RepliesLost.code() } else { 0 };
+        row.telemetry.phase = 0.0;
+    }
+    let file = folder.path().join("fault.csv");
+    std::fs::write(&file, common::text(&rows)).unwrap();
+    assert!(Recording::read(&file).unwrap().runs().is_empty());
+    let run = ReportedRun::read(&file, None).unwrap();
+    assert_eq!(run.outcome, Outcome::FaultedBefore(Fault::RepliesLost));
+    assert!(run.duration() > 4.0, "{} s of {} samples", run.duration(), rows.len());
+    let shown = page("fault", &[run], None);
+    assert!(shown.contains("RepliesLost") && !shown.contains("came to"));
+    assert!(shown.contains("time (s)") && !shown.contains("progress of the movement (%)"));
+}

@@ -259,7 +259,7 @@ pub fn check(
         limited_cycles: 0,
         violations: Vec::new(),
     };
-    check_plan(&primitive, &mut report);
+    check_plan(&primitive, course.speed, &mut report);
     let run = ClosedLoop::play(&primitive, course, progress);
     check_run(file, course, &run, &mut report);
     for margin in &report.margins {
@@ -283,10 +283,13 @@ fn image_checksum(image: &[u8]) -> u32 {
     lab::demonstration::recording::checksum(image.get(..sum).unwrap_or_default())
 }
 
-/// The plan alone: finite everywhere, within reach, ending at its goal.
-fn check_plan(primitive: &lab::primitive_file::HostPrimitive, report: &mut CheckReport) {
+/// The plan alone: finite everywhere, within reach, ending at its goal. Times are those of a run at `speed`.
+fn check_plan(primitive: &lab::primitive_file::HostPrimitive, speed: f64, report: &mut CheckReport) {
     let references = match plan::roll_out(primitive) {
-        Ok(references) => references,
+        Ok(mut references) => {
+            references.iter_mut().for_each(|reference| reference.time /= speed);
+            references
+        }
         Err(error) => {
             report.violations.push(format!("the plan cannot start: {error}"));
             return;

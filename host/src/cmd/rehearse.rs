@@ -186,7 +186,7 @@ fn keepable(movement: &PrimitiveFile, speed: f64) -> Result<(), Failure> {
              from its movement is not kept",
             speed, movement.movement.duration
         );
-        return Err(Failure::new(ErrorCode::ExpectationSpeed, "rehearse refused", text).help("a speed from 0.5 to 2"));
+        return Err(Failure::new(ErrorCode::ExpectationSpeed, "rehearse refused", text).help("a speed from 0.5 to 1.5"));
     }
     Ok(())
 }

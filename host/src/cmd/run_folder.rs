@@ -40,7 +40,7 @@ impl RunFolder {
         files::create_folder(base, "run refused")?;
         let path = unused(base, &Origin::now(), &primitive.name).map_err(|cause| failed(base, cause))?;
         let file = path.join("primitive.toml");
-        primitive.write(&file).map_err(|cause| super::check::failure(cause, &file, "run refused"))?;
+        primitive.write(&file).map_err(|cause| super::check::failure(cause, &file, "run"))?;
         Ok(Self { path, primitive: primitive.clone() })
     }
 

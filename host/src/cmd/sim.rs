@@ -103,7 +103,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     };
     // Before the device: one whose place is taken must not replace the log of the one that serves there.
     let no_bus = |address: &str, cause: std::io::Error| {
-        refused(address, cause.into()).help("choose another with `--can`, for example `--can 127.0.0.1:29536`")
+        let other = if address == "127.0.0.1:29536" { "127.0.0.1:29537" } else { "127.0.0.1:29536" };
+        refused(address, cause.into()).help(format!("choose another with `--can`, for example `--can {other}`"))
     };
     let bus = command.can.as_ref().map(|address| BusServer::listen(address).map_err(|cause| no_bus(address, cause)));
     let mut bus = bus.transpose()?;

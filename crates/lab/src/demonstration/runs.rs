@@ -14,7 +14,7 @@ impl Recording {
     /// The samples of each run, in their order; all of them if nothing was recorded of states.
     ///
     /// A run is played in state `run`, and lost answers of motors put it into `coast` for a moment. They do that to an
-    /// arm that holds or goes to the start as well: what only coasts is no run, unless there is none at all.
+    /// arm that holds or goes to the start as well: what only coasts is no run.
     #[must_use]
     pub fn runs(&self) -> Vec<Range<usize>> {
         let Some(states) = &self.state else {
@@ -29,8 +29,7 @@ impl Recording {
             }
         }
         let played = |stretch: &Range<usize>| Some(stretch.clone().find(|&at| is(at, State::Run))?..stretch.end);
-        let runs: Vec<_> = stretches.iter().filter_map(played).collect();
-        if runs.is_empty() { stretches } else { runs }
+        stretches.iter().filter_map(played).collect()
     }
 
     /// The last run, as a recording of its own; the whole recording if it has no states.

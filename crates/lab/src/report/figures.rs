@@ -1,4 +1,5 @@
-//! The figures of a report: every run over the progress of the movement, so that runs of any speed lie on one another.
+//! The figures of a report: every run over the progress of the movement, so that runs of any speed lie on one another;
+//! recordings in which no movement was played over time.
 
 use crate::arm::TORQUE_LIMITS;
 use crate::plan;
@@ -30,12 +31,16 @@ pub(super) fn all(runs: &[ReportedRun], primitive: Option<&PrimitiveFile>) -> Ve
     legend.push((Ink::Plan, format!("plan{}", if runs.len() > 1 { " of the first" } else { "" })));
     legend.push((Ink::Band, "expected, \u{b1} 2 standard deviations".to_owned()));
     legend.push((Ink::Limit, "limit".to_owned()));
+    let (x_label, x_range) = match figures.over_time() {
+        None => ("progress of the movement (%)", (0.0, 100.0)),
+        Some(longest) => ("time (s)", (0.0, longest)),
+    };
     let page = |rows: Vec<Vec<Panel>>| {
         let is_drawn = |ink: Ink| rows.iter().flatten().flat_map(|panel| &panel.curves).any(|curve| curve.ink == ink);
         Page {
             title: String::new(),
-            x_label: "progress of the movement (%)".to_owned(),
-            x_range: (0.0, 100.0),
+            x_label: x_label.to_owned(),
+            x_range,
             legend: legend.iter().filter(|(ink, _)| is_drawn(*ink)).cloned().collect(),
             rows: rows.into_iter().filter(|row| !row.is_empty()).collect(),
         }
@@ -55,6 +60,21 @@ struct Figures<'a> {
 }
 
 impl Figures<'_> {
+    /// The longest of the recordings (s), if no movement was played in any of them.
+    fn over_time(&self) -> Option<f64> {
+        let none = self.runs.iter().all(|run| run.progress.is_empty());
+        none.then(|| self.runs.iter().map(ReportedRun::duration).fold(0.0, f64::max)).filter(|longest| *longest > 0.0)
+    }
+
+    /// Where each sample of a run is drawn: at its progress, %, or at its time, s.
+    fn places(&self, run: &ReportedRun) -> Vec<f64> {
+        if self.over_time().is_none() {
+            return run.progress.iter().map(|u| 100.0 * u).collect();
+        }
+        let began = run.running.time.first().copied().unwrap_or(0.0);
+        run.running.time.iter().map(|time| time - began).collect()
+    }
+
     /// One panel; `value` gives a sample of a run, `planned` the same of its plan.
     fn panel(
         &self,
@@ -66,8 +86,8 @@ impl Figures<'_> {
         planned: impl Fn(&ReportedRun, usize) -> Option<f64>,
     ) -> Option<Panel> {
         let curve = |ink, run: &ReportedRun, value: &dyn Fn(&ReportedRun, usize) -> Option<f64>| {
-            let points = run.progress.iter().enumerate().filter_map(|(at, u)| Some((100.0 * u, value(run, at)?)));
-            Curve { ink, points: points.collect() }
+            let places = self.places(run).into_iter().enumerate();
+            Curve { ink, points: places.filter_map(|(at, x)| Some((x, value(run, at)?))).collect() }
         };
         let mut curves: Vec<Curve> = band.into_iter().collect();
         curves.extend(self.runs.iter().enumerate().map(|(at, run)| curve(ink(at), run, &value)));
@@ -183,7 +203,7 @@ impl Figures<'_> {
             let tau = run.running.tau.as_ref()?.get(at)?;
             Some(100.0 * tau.iter().zip(&*TORQUE_LIMITS).map(|(tau, limit)| tau.abs() / limit).fold(0.0, f64::max))
         };
-        let limit = Curve { ink: Ink::Limit, points: vec![(0.0, 100.0), (100.0, 100.0)] };
+        let limit = Curve { ink: Ink::Limit, points: vec![(0.0, 100.0), (self.over_time().unwrap_or(100.0), 100.0)] };
         let surprise = |run: &ReportedRun, at: usize| run.running.surprise.as_ref()?.get(at).copied();
         let panels = [
             self.panel("Plan beside the taught one", "mm", 5.0, None, beside, |_, _| None),
@@ -195,7 +215,8 @@ impl Figures<'_> {
 
     /// The band of the expected values of a sensor row; where their spread is not known, a band without width.
     fn expected(&self, row: usize) -> Option<Curve> {
-        let table = self.primitive?.expectation.as_ref()?;
+        // What is expected is known over the progress alone.
+        let table = self.primitive.filter(|_| self.over_time().is_none())?.expectation.as_ref()?;
         let last = table.mean.len().checked_sub(1)?.max(1) as f64;
         let side = |sign: f64| {
             let spread = |at: usize| table.spread.get(at).and_then(|point| point.get(row)).copied().unwrap_or(0.0);

@@ -68,11 +68,12 @@ fn happened(run: &ReportedRun) -> String {
     if run.runs > 1 {
         rows.push(("told here", format!("the last of {} runs in the recording", run.runs)));
     }
-    rows.extend([
-        ("outcome", format!("<span class=\"{class}\">{}</span>", escaped(&run.outcome.words()))),
-        ("duration", format!("{:.2} s", run.duration())),
-        ("came to", format!("{:.0} %", 100.0 * run.progress.last().copied().unwrap_or(0.0))),
-    ]);
+    rows.push(("outcome", format!("<span class=\"{class}\">{}</span>", escaped(&run.outcome.words()))));
+    let duration = format!("{:.2} s", run.duration());
+    match run.progress.last() {
+        None => rows.push(("recorded", duration)),
+        Some(progress) => rows.extend([("duration", duration), ("came to", format!("{:.0} %", 100.0 * progress))]),
+    }
     if let Some(tracking) = &run.tracking {
         let [rms, max, end] =
             [tracking.position_rms_m, tracking.position_max_m, tracking.position_end_m].map(|m| 1e3 * m);

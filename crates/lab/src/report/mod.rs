@@ -29,9 +29,9 @@ pub struct ReportedRun {
     pub notes: Vec<String>,
     /// The runs that the recording holds; the last one is told here.
     pub runs: usize,
-    /// The part in which its plan was played.
+    /// The part in which its plan was played; the whole recording if none was.
     pub running: Recording,
-    /// Progress of the movement at each of its samples, 0 to 1.
+    /// Progress of the movement at each of its samples, 0 to 1; empty if no plan was played.
     pub progress: Vec<f64>,
     /// Its end.
     pub outcome: Outcome,
@@ -50,6 +50,8 @@ pub struct ReportedRun {
 pub enum Outcome {
     /// No plan was played.
     NeverBegan,
+    /// No plan was played, because a fault came before.
+    FaultedBefore(Fault),
     /// The arm came to the end of the movement and held.
     Arrived,
     /// The same, but what was measured on the way was not as in the successful runs.
@@ -74,6 +76,9 @@ impl Outcome {
     pub fn words(self) -> String {
         match self {
             Self::NeverBegan => "no movement was played".to_owned(),
+            Self::FaultedBefore(fault) => {
+                format!("stopped by a fault before any movement was played ({fault:?}): {fault}")
+            }
             Self::Arrived => "arrived, and held the goal".to_owned(),
             Self::ArrivedUnlike => {
                 "arrived, and held the goal, but not as the successful runs: what was to be done may have failed"
@@ -112,12 +117,15 @@ impl ReportedRun {
         let alpha = primitive.map_or(CanonicalSystem::<f64>::DEFAULT_ALPHA, |primitive| primitive.movement.alpha);
         let runs = recording.runs();
         let last = runs.last().cloned().unwrap_or_default();
-        let running = recording.running();
+        let played = recording.running();
+        let progress: Vec<f64> = played.phase.iter().flatten().map(|phase| progress(*phase, alpha)).collect();
+        // Where none was played, as in the record of a fault on the way to the start, all that is known is shown.
+        let running = if runs.is_empty() { recording.clone() } else { played };
         let mut flags = FlagCounts::default();
         running.flags.iter().flatten().for_each(|sample| flags.add(*sample));
-        let progress: Vec<f64> = running.phase.iter().flatten().map(|phase| progress(*phase, alpha)).collect();
         let mut happenings = events::of(&recording, last.start, alpha);
-        let departures = primitive.map(|primitive| watched::departures(&running, &progress, primitive));
+        let departures =
+            primitive.filter(|_| !runs.is_empty()).map(|primitive| watched::departures(&running, &progress, primitive));
         for departure in departures.into_iter().flatten() {
             let time = |sample: usize| running.time.get(sample).copied().unwrap_or(0.0);
             happenings.push(Happening {
@@ -181,19 +189,20 @@ fn progress(phase: f64, alpha: f64) -> f64 {
 /// The end of the run of these samples: what came right behind it counts. A fault that was cleared before, and what the
 /// arm did afterwards, are other stories.
 fn outcome(recording: &Recording, run: &Range<usize>) -> Outcome {
+    let fault = |samples: Range<usize>| {
+        let codes = recording.fault.iter().flatten().take(samples.end).skip(samples.start);
+        let mut faults = codes.filter_map(|code| u8::try_from(*code).ok().and_then(Fault::from_code));
+        faults.find(|fault| *fault != Fault::None)
+    };
     if run.is_empty() {
-        return Outcome::NeverBegan;
+        return fault(0..recording.len()).map_or(Outcome::NeverBegan, Outcome::FaultedBefore);
     }
     let states: Vec<Option<State>> = recording.state.iter().flatten().map(|name| named(name)).collect();
     let behind = run.end;
     // Until the arm is taken up again: that clears the fault.
     let taken_up = |state: &Option<State>| matches!(state, Some(State::Hold | State::Gravity | State::Approach));
     let end = states.iter().skip(behind).position(taken_up).map_or(recording.len(), |at| behind + at);
-    let codes = recording.fault.iter().flatten().take(end).skip(behind);
-    let fault = codes
-        .filter_map(|code| u8::try_from(*code).ok().and_then(Fault::from_code))
-        .find(|fault| *fault != Fault::None);
-    match (states.get(behind), fault) {
+    match (states.get(behind), fault(behind..end)) {
         (Some(Some(State::Hold)), _) => Outcome::Arrived,
         (_, Some(fault)) => Outcome::Faulted(fault),
         (Some(_), None) => Outcome::Stopped,
