@@ -93,6 +93,7 @@ fn h14_an_output_that_is_an_input_a_device_or_a_folder_is_refused_even_when_forc
         ("learn demo.csv --name a -o . --force".to_owned(), "E231"),
         ("learn demo.csv --name a -o nowhere/a.toml".to_owned(), "E233"),
         ("learn demo.csv --name a -o /proc/a.toml".to_owned(), "E23"),
+        ("plot -r demo.csv -o a.svg --picture a.jpg".to_owned(), "E211"),
     ] {
         let refused = tactus(at, &line).failure().code(2);
         assert!(stderr(&refused).contains(code), "{line}: {}", stderr(&refused));

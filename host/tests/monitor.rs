@@ -94,6 +94,18 @@ fn cli_9_screens_are_as_they_were_looked_at() {
     is_golden("wide.txt", &fault(), (110, 30));
 }
 
+/// The change that makes it fail: a cause is one line, whatever its length.
+#[test]
+fn the_whole_cause_of_every_fault_is_on_the_smallest_screen() {
+    for fault in Fault::ALL {
+        let mut watch = watch();
+        watch.cycle(Telemetry { state: State::SoftStop.code(), fault: fault.code(), ..contact().telemetry.unwrap() });
+        let shown = screen(&watch, 80, 24).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(shown.contains(&watch.cause()), "{}: {shown}", watch.cause());
+        assert!(shown.contains("s or space: stop the arm"), "{shown}");
+    }
+}
+
 #[test]
 fn the_screen_shows_no_number_that_nobody_has_measured() {
     // A cycle of the start-up carries zeros for what is not known yet.

@@ -232,10 +232,16 @@ fn furnish(client: &mut Client<Device>, config: &Config, prepared: &Prepared, ke
 }
 
 /// Starts a simulated device and says hello.
+///
+/// # Errors
+/// The simulation cannot be started, or the user has interrupted: whoever does that waits for none that is not begun.
 pub(super) fn connect(
     options: &lab::simulation::SimulationOptions,
     interrupt: &Interrupt,
 ) -> Result<Client<Device>, TrialError> {
+    if interrupt.is_raised() {
+        return Err(HostError::Interrupted.into());
+    }
     let device = Device::Simulated(Box::new(Simulation::start(options)?));
     let mut client = Client::connect(device, "tactus")?;
     client.set_interrupt(interrupt.clone());
@@ -392,4 +398,23 @@ fn take_observation(client: &mut Client<Device>) -> (Observation, Vec<Snapshot>)
     };
     let world: &mut dyn std::any::Any = simulation.world();
     world.downcast_mut::<ObservedWorld>().map(ObservedWorld::take).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use lab::simulation::{Engine, SimulationOptions, WorldKind};
+
+    use super::*;
+
+    /// The change that makes it fail: an interrupt is looked at once the simulation has been started.
+    #[test]
+    fn nothing_is_started_for_a_user_who_has_interrupted() {
+        let nowhere = Engine::Qemu { image: "no image".into() };
+        let options = SimulationOptions::new(nowhere, 1, WorldKind::Simple);
+        let interrupt = Interrupt::never();
+        assert!(matches!(connect(&options, &interrupt), Err(TrialError::Simulation(_))));
+        interrupt.raise();
+        let Err(TrialError::Procedure(ended)) = connect(&options, &interrupt) else { panic!("the image is not there") };
+        assert!(matches!(ended, ProcedureError::Host(HostError::Interrupted)), "{ended}");
+    }
 }

@@ -22,7 +22,7 @@ const ZERO: &str = "bring the arm home, zero it again (`tactus run --at-home`), 
 /// For a fault after which the device starts the bus anew. Under a fault it would have the brakes set again.
 const CLEAR_AND_ACTIVATE: &str = "`tactus stop --clear-fault`, then activate at the pendant";
 /// For what was done at the pendant.
-const ACTIVATE: &str = "activate at the pendant; the next command ends the fault, or `tactus stop --clear-fault`";
+const ACTIVATE: &str = "activate at the pendant, then `tactus stop --clear-fault`";
 
 impl FaultGuide {
     /// The advice on a fault. A fault without advice does not compile.

@@ -23,7 +23,8 @@ pub fn blocked_remedy([reason, detail]: [u32; 2]) -> Option<&'static str> {
             "compare CTS and IPNM of that puck with docs/barrett-can.md, and correct them with Barrett's tools"
         }
         (14 | 15 | 17 | 18 | 20 | 23, _) => {
-            "emergency stop, then bring the arm to its home pose by hand and add `--at-home`"
+            "emergency stop, then bring the arm to its home pose by hand and add `--at-home` to the next command that moves \
+             it, such as `run`"
         }
         (19, _) => "wait a second: it goes on by itself",
         (24, 0) => "`tactus calibrate payload hand`, or `tactus calibrate payload undeclared`",
@@ -37,7 +38,9 @@ pub fn blocked_remedy([reason, detail]: [u32; 2]) -> Option<&'static str> {
 pub const fn stage_remedy(stage: Stage) -> Option<&'static str> {
     match stage {
         Stage::WaitingForIdle => Some("release the emergency stop and press Shift+Idle on the pendant"),
-        Stage::WaitingForZero => Some("bring the arm to its home pose by hand and add `--at-home`"),
+        Stage::WaitingForZero => Some(
+            "bring the arm to its home pose by hand and add `--at-home` to the next command that moves it, such as `run`",
+        ),
         Stage::WaitingForActive => Some("press Shift+Activate on the pendant"),
         Stage::Blocked => Some("`tactus status` tells what is in its way"),
         _ => None,

@@ -589,7 +589,10 @@ mod work {
 
     fn preparation_failure(error: PreparationError) -> Failure {
         match error {
-            PreparationError::Trial(error) => trial_failure(error),
+            PreparationError::Trial(error) => match trial_failure(error) {
+                failure if failure.code != ErrorCode::Interrupted => failure,
+                interrupted => interrupted.help("the same command goes on with what was taught, if it was"),
+            },
             error => Failure::new(ErrorCode::NotTaught, "experiment: no primitive was made", error),
         }
     }

@@ -134,6 +134,10 @@ fn open_outputs(
 ) -> Result<(Vec<OutputFile>, Option<OutputFile>), Failure> {
     output_file::apart(command.output.iter().chain(&command.picture).map(PathBuf::as_path))
         .map_err(|error| files::failure(error, DOING))?;
+    if let Some(picture) = command.picture.as_ref().filter(|file| file.extension().is_none_or(|end| end != "png")) {
+        let cause = format!("{}: a picture is written as .png", picture.display());
+        return Err(Failure::new(ErrorCode::FigureFormat, "plot refused", cause).help("name a file that ends in .png"));
+    }
     let create = |file: &PathBuf| files::create(file, global, inputs, DOING);
     let outputs = command.output.iter().map(create).collect::<Result<Vec<_>, _>>()?;
     Ok((outputs, command.picture.as_ref().map(create).transpose()?))
@@ -181,6 +185,10 @@ fn tracking(recording: &Recording, output: Output) -> Result<Option<Tracking>, F
         Err(ComparisonError { lack: Lack::Run, .. }) => {
             output.warn("nothing was played in this recording: all of it is drawn, without figures of tracking");
             Ok(None)
+        }
+        Err(cause @ ComparisonError { lack: Lack::Poses, .. }) => {
+            Err(Failure::new(ErrorCode::PlotInput, "plot", cause)
+                .help("a recording of joint angles alone is drawn with `--demonstration`"))
         }
         Err(cause) => Err(Failure::new(ErrorCode::PlotInput, "plot", cause)),
     }

@@ -7,7 +7,7 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Block, Paragraph};
+use ratatui::widgets::{Block, Paragraph, Wrap};
 
 use super::Watch;
 
@@ -34,16 +34,22 @@ pub fn draw(frame: &mut Frame<'_>, watch: &Watch) {
         let words = format!("{} x {} are needed, here are {} x {}", SMALLEST.0, SMALLEST.1, area.width, area.height);
         return frame.render_widget(Paragraph::new(words), area);
     }
+    // What to do stands at the end of a cause: a long one takes the line of the newest event, which says the same.
+    let cause = watch.cause();
+    let is_long = cause.chars().count() > usize::from(area.width);
     let rows = Layout::vertical([
-        Constraint::Length(3),
+        Constraint::Length(2),
+        Constraint::Length(1 + u16::from(is_long)),
         Constraint::Length(9),
         Constraint::Length(8),
         Constraint::Length(2),
-        Constraint::Min(1),
+        Constraint::Min(u16::from(!is_long)),
         Constraint::Length(1),
     ]);
-    let [head, joints, senses, health, events, keys] = rows.areas(area);
+    let [head, reason, joints, senses, health, events, keys] = rows.areas(area);
     frame.render_widget(Paragraph::new(heading(watch, head.width)), head);
+    let style = if watch.fault().is_some() { BAD } else { WARNING };
+    frame.render_widget(Paragraph::new(Line::styled(cause, style)).wrap(Wrap { trim: true }), reason);
     panel(frame, joints, " joints ", joint_lines(watch, joints.width));
     let [left, right] = Layout::horizontal([Constraint::Percentage(50), Constraint::Percentage(50)]).areas(senses);
     let title = if watch.expected().is_some() { " wrench (+ expected) " } else { " wrench " };
@@ -87,7 +93,6 @@ fn heading(watch: &Watch, width: u16) -> Vec<Line<'static>> {
             Span::styled(state.to_uppercase(), style),
             Span::raw(format!("   {movement}")),
         ]),
-        Line::styled(watch.cause(), if watch.fault().is_some() { BAD } else { WARNING }),
     ]
 }
 
