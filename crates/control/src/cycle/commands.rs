@@ -45,6 +45,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.supervisor.law() == State::Run {
             return Err(Refusal::WrongState);
         }
+        // What a stop carries is what the sensor measures: with that as its zero the load would be let fall.
+        if self.law.support().carries() {
+            return Err(Refusal::ForceAtRest);
+        }
         if self.fastest(measured) > R::constant(CALM) {
             return Err(Refusal::Moving);
         }

@@ -38,8 +38,8 @@ pub(super) enum Law<R: Real> {
     /// `Idle` and `Fault`: no torque. Frames of zero torque are sent this many cycles more; the safety module is asked
     /// for its brakes until it has said so many times in a row that they are on.
     Off { zero_cycles: u8, brakes: u8 },
-    /// `Gravity`.
-    Gravity,
+    /// `Gravity`, with what a stop before it carried.
+    Gravity(Support<R>),
     /// `Hold` and `Approach`.
     Posture(Posture<R>),
     /// `Run`.
@@ -48,6 +48,17 @@ pub(super) enum Law<R: Real> {
     SoftStop(Ramp<R>, Support<R>),
     /// `Lower`: as `SoftStop`, and gravity is taken away as the arm sinks.
     Lower(Lowering<R>),
+}
+
+impl<R: Real> Law<R> {
+    /// The part that is carried of a load that nobody declared.
+    pub(super) fn support(&self) -> Support<R> {
+        match self {
+            Law::Gravity(support) | Law::SoftStop(_, support) => *support,
+            Law::Lower(lowering) => lowering.support,
+            Law::Off { .. } | Law::Posture(_) | Law::Run(_) => Support::new(),
+        }
+    }
 }
 
 /// A posture that is held, or moved along an approach.
@@ -275,9 +286,9 @@ pub(super) struct Lowering<R: Real> {
 }
 
 impl<R: Real> Lowering<R> {
-    /// Begins with all of gravity.
-    pub(super) fn new(rest: Ramp<R>) -> Self {
-        Lowering { rest, share: R::constant(1.0), support: Support::new(), rested: 0, left: LOWERING }
+    /// Begins with all of gravity, and with what is carried already.
+    pub(super) fn new(rest: Ramp<R>, support: Support<R>) -> Self {
+        Lowering { rest, share: R::constant(1.0), support, rested: 0, left: LOWERING }
     }
 
     /// Takes the speed of the hand (m/s) and of the fastest joint (rad/s).

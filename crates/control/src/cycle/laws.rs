@@ -55,7 +55,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let pushed = (!self.bounds.contain(&measured.state.q)).then(|| self.push_back(measured));
         let mut demand = match &self.law {
             Law::Off { .. } => return None,
-            Law::Gravity => self.float(measured),
+            Law::Gravity(_) => self.lead(measured),
             Law::Posture(_) => self.hold_to(measured),
             Law::Run(_) => self.run_primitive(measured),
             Law::SoftStop(..) | Law::Lower(_) => self.stop(measured),
@@ -131,6 +131,26 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         Demand { explained: (gravity, Vector7::zeros()), ..self.plain(measured, torque) }
     }
 
+    /// Gravity compensation, and what a stop carried, as long as the hand bears it: a fault that is cleared leaves its
+    /// load where it was.
+    #[inline(never)]
+    fn lead(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
+        let borne = self.borne(measured);
+        let mut demand = self.float(measured);
+        if let Law::Gravity(support) = &mut self.law
+            && support.carries()
+        {
+            support.keep(borne);
+            demand.torque.0 += support.torque(measured.frames);
+        }
+        demand
+    }
+
+    /// The load (N) that the hand is measured to bear; none without a sensor.
+    fn borne(&self, measured: &Measured<'_, R>) -> R {
+        if self.senses(measured) == Senses::Lost { R::constant(0.0) } else { -measured.wrench.force.z }
+    }
+
     /// Gravity compensation and damping; what else was there is ramped away, and gravity too where the arm is lowered.
     /// Not inlined, as [`Cycle::hold_to`].
     #[inline(never)]
@@ -138,7 +158,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let twist = measured.frames.jacobian().twist(&measured.state.dq.0);
         // What is not measured does not sink.
         let sinking = if measured.state.missing == 0 { -twist[2] } else { R::constant(0.0) };
-        let borne = if self.senses(measured) == Senses::Lost { R::constant(0.0) } else { -measured.wrench.force.z };
+        let borne = self.borne(measured);
         let (rest, share, support) = match &mut self.law {
             Law::SoftStop(ramp, support) => {
                 support.step(sinking, borne, R::constant(0.0));

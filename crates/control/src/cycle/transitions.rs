@@ -62,21 +62,20 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         match (state, &mut self.law) {
             (State::Hold, Law::Posture(posture)) => posture.follow(None, &self.calibration.transmission),
             (State::Hold, Law::Run(_)) => self.law = Law::Posture(self.after_run(measured)),
-            (State::Hold, Law::SoftStop(_, support)) => {
-                let load = support.torque(measured.frames);
-                self.law = Law::Posture(self.posture_under(&load, measured));
-            }
-            (State::Hold, _) => self.law = Law::Posture(Posture::at(measured.state.q)),
+            (State::Hold, _) => self.law = Law::Posture(self.posture_here(measured)),
             (State::SoftStop | State::Lower, _) => {
                 let gravity = self.model.gravity_torque(measured.frames);
-                let rest = Ramp::new(self.limiter.last().torques().0 - gravity.0, STOP_RAMP);
+                // What is carried already is not ramped away: it would fall until it is caught again.
+                let support = self.law.support();
+                let load = support.torque(measured.frames);
+                let rest = Ramp::new(self.limiter.last().torques().0 - gravity.0 - load, STOP_RAMP);
                 self.law = if state == State::Lower {
-                    Law::Lower(Lowering::new(rest))
+                    Law::Lower(Lowering::new(rest, support))
                 } else {
-                    Law::SoftStop(rest, Support::new())
+                    Law::SoftStop(rest, support)
                 };
             }
-            _ => self.law = Law::Gravity,
+            _ => self.law = Law::Gravity(self.law.support()),
         }
     }
 
@@ -93,7 +92,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.hand.stay();
         self.observer.postpone();
         if !matches!(self.law, Law::Posture(_)) {
-            self.law = Law::Posture(Posture::at(measured.state.q));
+            self.law = Law::Posture(self.posture_here(measured));
         }
         if let Law::Posture(posture) = &mut self.law {
             posture.follow(Some(approach), &self.calibration.transmission);
@@ -140,6 +139,16 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             _ => Vector7::zeros(),
         };
         self.posture_under(&(self.beyond + friction + stiff.damping.component_mul(&velocity)), measured)
+    }
+
+    /// The present posture, held with what is carried of a load.
+    fn posture_here(&self, measured: &Measured<'_, R>) -> Posture<R> {
+        let support = self.law.support();
+        if support.carries() {
+            self.posture_under(&support.torque(measured.frames), measured)
+        } else {
+            Posture::at(measured.state.q)
+        }
     }
 
     /// The present posture, held with this torque (N m) from the beginning.

@@ -10,7 +10,7 @@ use pinned_init::{Init, init};
 
 use crate::law::window::Window;
 use crate::model::kinematics::Jacobian;
-use crate::real::{Real, at_most, sqrt};
+use crate::real::{Real, at_least, at_most, sqrt};
 use crate::time::{PERIOD, periods};
 use crate::units::{JointTorques, Vector6};
 
@@ -21,8 +21,9 @@ pub const WINDOW_CAPACITY: usize = periods(0.5) as usize;
 /// something presses back: a run that expects to press on what is not there would else throw the arm (30 N: 1.7 m/s).
 const UNCONFIRMED: [f64; 2] = [5.0, 0.5];
 
-/// Most that may be applied along a push, in parts of the push, beyond `UNCONFIRMED`. It is the gain of Eq (12) at rest
-/// in a compliant run, `P + K_i Dt`: nothing presses back on a hand that gives way (decision 0131).
+/// Most that may be applied along a push, in parts of the push, if that is more than `UNCONFIRMED`. It is the gain of
+/// Eq (12) at rest in a compliant run, `P + K_i Dt`: nothing presses back on a hand that gives way (decision 0131). At
+/// most twice `UNCONFIRMED`, all that Eq (12) commands: a light push does not release what is expected (decision 0133).
 const GIVING: f64 = 5.0;
 
 /// Fastest rise of what counts as confirmed (N/s, N m/s). A guard, not measured: the sensor also feels the inertia of
@@ -62,9 +63,9 @@ impl<R: Real> ForceController<R> {
         -(error * proportional + self.window.sum() * (integral * period))
     }
 
-    /// The wrench that is to be applied (world axes), its force and its torque cut to what the environment presses back
-    /// along them, as the sensor measures it, or to `GIVING` times what it pushes along them, and `UNCONFIRMED` beyond
-    /// that; their directions are kept.
+    /// The wrench that is to be applied (world axes), its force and its torque cut to `UNCONFIRMED` beyond what the
+    /// environment presses back along them, as the sensor measures it; along a push to `GIVING` times the push, between
+    /// `UNCONFIRMED` and twice that. Their directions are kept.
     pub fn confirmed(&mut self, wanted: &Vector6<R>, measured: &Vector6<R>) -> Vector6<R> {
         let (mut applied, zero) = (*wanted, R::constant(0.0));
         let before = self.confirmed.map_or([None; 2], |before| before.map(Some));
@@ -75,7 +76,11 @@ impl<R: Real> ForceController<R> {
             let (length, unconfirmed) = (sqrt(part.dot(&part)), R::constant(unconfirmed));
             if length > unconfirmed {
                 let push = part.dot(&measured.fixed_rows::<3>(first)) / length;
-                let now = if push > zero { push * R::constant(GIVING) } else { -push };
+                let now = if push > zero {
+                    at_least(at_most(push * R::constant(GIVING) - unconfirmed, unconfirmed), zero)
+                } else {
+                    -push
+                };
                 *confirmed = before.map_or(now, |before| at_most(now, before + R::constant(rise * PERIOD)));
                 let most = *confirmed + unconfirmed;
                 if length > most {

@@ -4,7 +4,8 @@
 //! to 1 m/s, until it lay on something. So a force upwards grows while the hand sinks, up to that of 1.2 kg. Where the
 //! hand rises it shrinks as fast. Nor does it stay above what the wrist's sensor measures that the hand bears: an arm
 //! that a person has pressed down does not spring up, and no joint is driven to its limit by a load that is gone.
-//! Without a sensor there is no force.
+//! Without a sensor there is no force. Once a fault is cleared the arm floats with the force it had, as far as the hand
+//! still bears it, and a hold takes it over.
 
 use crate::model::kinematics::Frames;
 use crate::real::{Real, at_least, at_most};
@@ -46,6 +47,18 @@ impl<R: Real> Support<R> {
         let wanted = self.force + change * R::constant(TAKING * PERIOD);
         let most = at_least(at_most(borne, R::constant(MOST)), self.force - R::constant(LEAVING * PERIOD));
         self.force = at_least(at_most(wanted, most), zero);
+    }
+
+    /// Keeps the force, as far as the hand is measured to bear it (N), and takes no more: a person who leads the arm
+    /// down does not press against a spring.
+    pub fn keep(&mut self, borne: R) {
+        let most = at_least(borne, self.force - R::constant(LEAVING * PERIOD));
+        self.force = at_least(at_most(self.force, most), R::constant(0.0));
+    }
+
+    /// True if there is a force.
+    pub fn carries(&self) -> bool {
+        self.force > R::constant(0.0)
     }
 
     /// The force on the hand, as torque of the joints (N m).

@@ -331,3 +331,67 @@ fn g1_a_stopped_arm_that_somebody_pressed_down_does_not_spring_up_when_it_is_let
         }
     }
 }
+
+/// An arm that holds with an empty hand, carries a kilogram that nobody declared, and has come to rest in a soft stop.
+fn stopped_under_a_kilogram(q: [f64; 7], fault: Fault) -> Rig<f32> {
+    let mut rig = Rig::<f32>::new(q, 1);
+    rig.command(Command::Hold);
+    rig.run_for(1.0);
+    rig.command(Command::Tare);
+    rig.plant.push[2] = -9.81;
+    rig.run_for(0.3);
+    if fault == Fault::None {
+        rig.command(Command::Stop);
+    } else {
+        rig.external = Some(fault);
+        rig.tick(None);
+        rig.external = None;
+    }
+    rig.run_for(2.0);
+    assert_eq!(rig.cycle.state(), State::SoftStop);
+    let rests = fastest(&mut rig, 0.1);
+    assert!(rests < 0.02, "{rests} m/s in the stop");
+    rig
+}
+
+/// The changes that make it fail: floating begins without what the stop carried; a hold or an approach behind it does;
+/// a tare is taken.
+#[test]
+fn e7_a_load_that_a_stop_carries_is_not_let_fall_by_what_a_person_does_next() {
+    let approach = Command::Approach { q: [0.0, 1.3, 0.0, 0.3, 0.0, 0.0, 0.0], duration: 0.0 };
+    let cases: [(Fault, &[Command]); 6] = [
+        (Fault::MotorHot, &[Command::ClearFault]),
+        (Fault::MotorHot, &[Command::ClearFault, Command::Gravity, Command::Hold]),
+        (Fault::MotorHot, &[Command::ClearFault, approach]),
+        (Fault::None, &[Command::Gravity, Command::Hold]),
+        (Fault::None, &[Command::Release, Command::Gravity, Command::Hold]),
+        (Fault::None, &[Command::Tare, Command::Hold]),
+    ];
+    for (fault, commands) in cases {
+        for q in [OUT, START] {
+            let mut rig = stopped_under_a_kilogram(q, fault);
+            for command in commands {
+                let event = rig.tick(Some(*command)).event;
+                let begun = rig.plant.frames().tool_pose().position.z;
+                let speed = fastest(&mut rig, 1.0);
+                let sunk = begun - rig.plant.frames().tool_pose().position.z;
+                println!("{command:?}, {event:?}: {speed:.3} m/s, {sunk:.3} m, {:?}", rig.cycle.state());
+                assert!(speed < if *command == approach { 0.5 } else { SLOW }, "{command:?}: {speed} m/s");
+            }
+        }
+    }
+}
+
+/// The change that makes it fail: floating keeps what the stop carried, whatever the hand bears.
+#[test]
+fn e7_what_is_carried_on_after_a_clear_goes_with_the_load() {
+    for q in [OUT, START] {
+        let mut rig = stopped_under_a_kilogram(q, Fault::None);
+        rig.command(Command::Gravity);
+        rig.run_for(0.3);
+        rig.plant.push[2] = 0.0;
+        let speed = fastest(&mut rig, 1.0);
+        println!("{speed:.3} m/s up");
+        assert!(speed < 0.25, "{speed} m/s");
+    }
+}

@@ -41,6 +41,12 @@ pub(crate) struct Plant {
     pub(crate) hand_weight: f64,
     /// Force that the sensor alone reports, along its x axis (N).
     pub(crate) glitch: f64,
+    /// Wrench that the sensor alone reports, at the grasp point (N, N m, world axes).
+    pub(crate) lie: [f64; 6],
+    /// Share of the inertia of the hand that the sensor feels; 0 by default.
+    pub(crate) inertia: f64,
+    /// Mean acceleration of the joints in the last control period (rad/s^2).
+    pub(crate) ddq: Vector7<f64>,
     /// The one value that a stuck sensor reports.
     pub(crate) stuck: Option<RawWrench>,
     /// True if what the sensor feels of the environment has the wrong sign.
@@ -67,6 +73,9 @@ impl Plant {
             torque: Vector7::zeros(),
             hand_weight: model::HAND_MASS * 9.81,
             glitch: 0.0,
+            lie: [0.0; 6],
+            inertia: 0.0,
+            ddq: Vector7::zeros(),
             stuck: None,
             reversed: false,
             deaf: false,
@@ -101,7 +110,17 @@ impl Plant {
         let frames = self.frames();
         let sign = if self.reversed { -1.0 } else { 1.0 };
         let [fx, fy, fz, nx, ny, nz] = self.environment().map(|part| sign * part);
-        let weight = Vector3::new(0.0, 0.0, -self.hand_weight);
+        let [lx, ly, lz, mx, my, mz] = self.lie;
+        let [fx, fy, fz, nx, ny, nz] = [fx + lx, fy + ly, fz + lz, nx + mx, ny + my, nz + mz];
+        let mut weight = Vector3::new(0.0, 0.0, -self.hand_weight);
+        if self.inertia != 0.0 {
+            let twist = frames.jacobian().twist(&self.ddq);
+            let at_tool: Vector3<f64> = twist.fixed_rows::<3>(0).into();
+            let turning: Vector3<f64> = twist.fixed_rows::<3>(3).into();
+            let centre = frames.sensor_to_world() * Vector3::from(model::HAND_CENTRE);
+            let at_centre = at_tool + turning.cross(&(centre + frames.tool_to_sensor()));
+            weight -= at_centre * (self.inertia * model::HAND_MASS);
+        }
         let to_sensor = frames.sensor_to_world().transpose();
         let centre = frames.sensor_to_world() * Vector3::from(model::HAND_CENTRE);
         let force = Vector3::new(fx, fy, fz) + weight;
@@ -151,6 +170,7 @@ impl Plant {
     /// One control period of physics.
     pub(crate) fn advance(&mut self) {
         let dt = control::PERIOD / SUBSTEPS as f64;
+        let before = self.dq;
         for _ in 0..SUBSTEPS {
             let frames = self.frames();
             let mass = self.model.mass_matrix(&frames);
@@ -177,6 +197,7 @@ impl Plant {
             self.dq = velocity;
             self.q += self.dq * dt;
         }
+        self.ddq = (self.dq - before) / control::PERIOD;
     }
 }
 
