@@ -49,6 +49,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "the arm stands: no plan and no feedback is computed",
     ),
     (
+        "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::lead",
+        "led by hand: no plan and no feedback is computed",
+    ),
+    (
         "control::cycle::laws::<impl control::cycle::Cycle<R,_>>::float",
         "led by hand: no plan and no feedback is computed",
     ),
