@@ -402,19 +402,20 @@ fn take_observation(client: &mut Client<Device>) -> (Observation, Vec<Snapshot>)
 
 #[cfg(test)]
 mod tests {
-    use lab::simulation::{Engine, SimulationOptions, WorldKind};
+    use lab::simulation::{Engine, FlashSource, SimulationOptions, WorldKind};
 
     use super::*;
 
     /// The change that makes it fail: an interrupt is looked at once the simulation has been started.
     #[test]
     fn nothing_is_started_for_a_user_who_has_interrupted() {
-        let nowhere = Engine::Qemu { image: "no image".into() };
-        let options = SimulationOptions::new(nowhere, 1, WorldKind::Simple);
+        let mut options = SimulationOptions::new(Engine::InProcess, 1, WorldKind::Simple);
+        // A folder is no flash: this simulation cannot be started.
+        options.flash = FlashSource::File(std::env::temp_dir());
         let interrupt = Interrupt::never();
         assert!(matches!(connect(&options, &interrupt), Err(TrialError::Simulation(_))));
         interrupt.raise();
-        let Err(TrialError::Procedure(ended)) = connect(&options, &interrupt) else { panic!("the image is not there") };
+        let Err(TrialError::Procedure(ended)) = connect(&options, &interrupt) else { panic!("it was started") };
         assert!(matches!(ended, ProcedureError::Host(HostError::Interrupted)), "{ended}");
     }
 }
