@@ -72,6 +72,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "control::sense::wrench::WrenchEstimator<R>::follow",
         "the memory is full; a few dozen instructions without a loop over time",
     ),
+    (
+        "control::cycle::law::Leaning<R>",
+        "as a compliant run begins under a load: seven joints, a few instructions each",
+    ),
     ("control::cycle::law::Posture<R>::effort", "the arm stands: no plan and no feedback is computed"),
     ("control::law::joint::JointController<R>::keep", "a reply is missing: a few dozen instructions"),
     ("control::sense::swing", "the memory is full; seven joints, a few dozen instructions each"),

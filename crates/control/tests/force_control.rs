@@ -42,7 +42,7 @@ where
         let error =
             Vector6::from_fn(|axis, _| R::constant(number(expected[axis])) - R::constant(number(measured[axis])));
         let u = controller.command(&error, R::constant(1.0), R::constant(2.0), R::constant(PERIOD), false);
-        let tau = ForceController::torque(&jacobian, &u);
+        let tau = jacobian.transpose_times(&u);
         let mut compare = |which: usize, computed: f64, golden: f64| {
             worst[which] = worst[which].max((computed - golden).abs());
             peak[which] = peak[which].max(golden.abs());
@@ -50,7 +50,7 @@ where
         for axis in 0..6 {
             compare(0, u[axis].into(), number(command[axis]));
         }
-        for (computed, column) in tau.0.iter().zip(torque) {
+        for (computed, column) in tau.iter().zip(torque) {
             compare(1, (*computed).into(), number(column));
         }
         rows += 1;

@@ -47,6 +47,7 @@ fn a_wrench_does_the_same_work_at_the_joints_and_at_the_tool() {
         let jacobian = frames(q).jacobian();
         let power = jacobian.transpose_times(&wrench).dot(&dq);
         assert!((power - wrench.dot(&jacobian.twist(&dq))).abs() < 1e-12);
+        assert!((frames(q).joint_torques(&wrench).0 - jacobian.transpose_times(&wrench)).amax() < 1e-12);
     }
 }
 

@@ -8,7 +8,7 @@ use crate::law::breakaway::Breakaway;
 use crate::law::integral::PostureIntegral;
 use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
-use crate::law::settling::Settling;
+use crate::law::settling::{CLAMP, Settling};
 use crate::law::support::Support;
 use crate::model::friction;
 use crate::plan::approach::Approach;
@@ -17,7 +17,7 @@ use crate::real::{Real, at_least, at_most, sqrt, within};
 use crate::sense::drift::Drift;
 use crate::sense::joints::JointState;
 use crate::time::{PERIOD, periods};
-use crate::units::{JOINTS, JointPositions, JointVelocities, Vector7};
+use crate::units::{JOINTS, JointPositions, JointTorques, JointVelocities, Vector7};
 
 /// Speed at which a held posture returns after somebody pushed the arm away from it (rad/s).
 const RETURN_SPEED: f64 = 0.2;
@@ -190,8 +190,10 @@ impl<R: Real> Posture<R> {
 pub(super) struct Running<R: Real> {
     pub(super) operational: OperationalController<R>,
     pub(super) controller: JointController<R>,
-    /// Torque beyond what the arm itself needs when a compliant run began.
+    /// Torque beyond what the arm itself needs when a compliant run began, as far as an integral holds it.
     pub(super) handover: Ramp<R>,
+    /// The rest of that torque.
+    pub(super) leaning: Leaning<R>,
     pub(super) lag: Lag<R>,
     /// Error of the force sensor in free motion.
     pub(super) drift: Drift<R>,
@@ -254,6 +256,62 @@ impl<R: Real> Ramp<R> {
         let share = R::from_counts(i32::from(self.left)) * self.slope;
         self.left = self.left.saturating_sub(1);
         self.torque * share
+    }
+}
+
+/// Speed along its torque at which a drawn spring is let go of (rad/s): half of what lets go of a posture on its way
+/// back. An arm that is leaned on moves against that torque, if at all.
+const RELEASED: f64 = 0.06;
+
+/// The torque of a spring that somebody draws, or that a load has drawn. It is taken away steadily, and at once where
+/// the arm begins to follow it: who lets go of the arm is not thrown back.
+pub(super) struct Leaning<R: Real> {
+    ramp: Ramp<R>,
+    /// Power at which it is let go of (W).
+    power: R,
+}
+
+impl<R: Real> Leaning<R> {
+    /// Parts a torque (N m) that is to be taken away within so many control periods into what an integral holds at
+    /// most, and the rest.
+    pub(super) fn part(mut torque: Vector7<R>, periods: u16) -> (Ramp<R>, Self) {
+        let (mut rest, mut leans) = (Vector7::zeros(), false);
+        for ((torque, rest), most) in torque.iter_mut().zip(rest.iter_mut()).zip(CLAMP) {
+            let held = within(*torque, R::constant(most));
+            if held != *torque {
+                (*rest, leans) = (*torque - held, true);
+                *torque = held;
+            }
+        }
+        let leaning = if leans { Leaning::new(rest, periods) } else { Leaning::none() };
+        (Ramp::new(torque, periods), leaning)
+    }
+
+    #[inline(never)]
+    fn new(torque: Vector7<R>, periods: u16) -> Self {
+        let power = sqrt(torque.dot(&torque)) * R::constant(RELEASED);
+        Leaning { ramp: Ramp::new(torque, periods), power }
+    }
+
+    /// Nothing to take away.
+    pub(super) fn none() -> Self {
+        Leaning { ramp: Ramp::none(), power: R::constant(0.0) }
+    }
+
+    /// Adds the torque of this control period (N m) for joints at this speed (rad/s), and at this one in their plan.
+    pub(super) fn act(&mut self, torque: &mut JointTorques<R>, dq: &JointVelocities<R>, planned: &JointVelocities<R>) {
+        if self.ramp.left > 0 {
+            self.fade(torque, &(dq.0 - planned.0));
+        }
+    }
+
+    /// Not inlined: it is asked in the first second of a compliant run.
+    #[inline(never)]
+    fn fade(&mut self, torque: &mut JointTorques<R>, away: &Vector7<R>) {
+        if self.ramp.torque.dot(away) > self.power {
+            *self = Leaning::none();
+        }
+        torque.0 += self.ramp.step();
     }
 }
 

@@ -5,7 +5,6 @@ use crate::cycle::law::{Lag, Law, Running, SINKING_SPEED};
 use crate::cycle::record::{Event, flags};
 use crate::cycle::{Cycle, Measured, WRENCH_AGE};
 use crate::guard::monitor::{TIP_REACH, TIP_SPEED_LIMIT, TRACKING_LIMIT};
-use crate::law::force::ForceController;
 use crate::law::gains::Tracking;
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
@@ -231,7 +230,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             // A run begins with a primitive, and no other is loaded meanwhile; else the arm floats.
             return self.float(measured);
         };
-        let Running { operational, controller, handover, lag, drift, pressing, settling } = running;
+        let Running { operational, controller, handover, leaning, lag, drift, pressing, settling } = running;
         let (options, tracking) = (run.options, self.gains.tracking(run.options.compliant));
         let hand = self.hand.answering().filter(HandState::feels);
         let gauges = hand.as_ref().map(|hand| &hand.gauges);
@@ -281,7 +280,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             // The expected wrench is fed forward, because the gain of the integral is finite.
             let wanted = bounded(&command, tracking.force_limit) * run.kept() - deviation.expected.in_world(to_world);
             let wanted = self.force.confirmed(&wanted, &measured.wrench.in_world(to_world));
-            *pressing = ForceController::torque(&measured.frames.jacobian(), &wanted).0;
+            *pressing = measured.frames.joint_torques(&wanted).0;
             torque.0 += *pressing;
             set |= flags::FORCE_CONTROL;
         }
@@ -300,6 +299,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             }
         }
         torque.0 += handover.step() + settling.torque();
+        leaning.act(&mut torque, &measured.state.dq, &reference.dq);
         *lag = Lag::new(&(task.pose.position - measured.pose.position), operational.lag());
         Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise, flags: set, explained }
     }

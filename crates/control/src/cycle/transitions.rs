@@ -2,12 +2,11 @@
 
 use crate::act::limit::LimitReport;
 use crate::command::RunOptions;
-use crate::cycle::law::{Lag, Law, Lowering, Posture, Ramp, Running};
+use crate::cycle::law::{Lag, Law, Leaning, Lowering, Posture, Ramp, Running};
 use crate::cycle::{BRAKE_WORDS, Caution, Cycle, HANDOVER, Measured, STOP_RAMP, ZERO_CYCLES};
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
 use crate::guard::supervisor::{State, Trigger};
-use crate::law::force::ForceController;
 use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
 use crate::law::settling::Settling;
@@ -113,16 +112,17 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         self.force.restart(self.gains.tracking(options.compliant).force_window);
         // What a limit has cut off is not to be taken over: after arming that is the gravity which has yet to build up.
-        let handover = if options.compliant && held.is_some() && !self.cut.is_cut() {
+        let (handover, leaning) = if options.compliant && held.is_some() && !self.cut.is_cut() {
             let load = if options.force_control { self.load_expected_first(measured) } else { Vector7::zeros() };
-            Ramp::new(self.beyond - load, HANDOVER)
+            Leaning::part(self.beyond - load, HANDOVER)
         } else {
-            Ramp::none()
+            (Ramp::none(), Leaning::none())
         };
         self.law = Law::Run(Running {
             operational: OperationalController::new(start),
             controller: JointController::new(),
             handover,
+            leaning,
             lag: Lag::none(),
             drift: Drift::new(),
             pressing: Vector7::zeros(),
@@ -168,7 +168,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 let expected = Deviation::new(&expected.at(R::constant(0.0)), &Wrench::zero(), None).expected;
                 let to_world = measured.frames.tool_to_world();
                 let load = self.force.confirmed(&-expected.in_world(to_world), &measured.wrench.in_world(to_world));
-                ForceController::torque(&measured.frames.jacobian(), &load).0
+                measured.frames.joint_torques(&load).0
             }
             None => Vector7::zeros(),
         }

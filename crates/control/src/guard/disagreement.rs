@@ -94,7 +94,7 @@ pub(crate) struct Effort<'a, R: Real> {
 #[inline(never)]
 pub(crate) fn torques_of<R: Real>(wrench: &Wrench<R>, frames: &Frames<R>) -> Vector7<R> {
     let (force, torque) = (wrench.force, frames.tool_to_world() * wrench.torque);
-    frames.jacobian().transpose_times(&Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z))
+    frames.joint_torques(&Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)).0
 }
 
 /// Compares the feedback torque with the motion.

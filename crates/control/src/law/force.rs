@@ -9,10 +9,9 @@
 use pinned_init::{Init, init};
 
 use crate::law::window::Window;
-use crate::model::kinematics::Jacobian;
 use crate::real::{Real, at_least, at_most, sqrt};
 use crate::time::{PERIOD, periods};
-use crate::units::{JointTorques, Vector6};
+use crate::units::Vector6;
 
 /// Longest window: 0.5 s, in control periods.
 pub const WINDOW_CAPACITY: usize = periods(0.5) as usize;
@@ -27,7 +26,7 @@ const UNCONFIRMED: [f64; 2] = [5.0, 0.5];
 const GIVING: f64 = 5.0;
 
 /// Fastest rise of what counts as confirmed (N/s, N m/s). A guard, not measured: the sensor also feels the inertia of
-/// the hand, which "presses back" while the hand is thrown. The rig of the tests has no such inertia in its sensor.
+/// the hand, which "presses back" while the hand is thrown.
 const CONFIRMATION: [f64; 2] = [20.0, 2.0];
 
 /// Eq (12).
@@ -53,7 +52,7 @@ impl<R: Real> ForceController<R> {
     }
 
     /// The command `-(P e + K_i dt sum e)` in the axes of the error (N, N m), world axes for
-    /// [`ForceController::torque`].
+    /// [`Frames::joint_torques`](crate::model::kinematics::Frames::joint_torques).
     ///
     /// `frozen` (a torque saturates) keeps the window as it is. The error of this tick belongs to the window.
     pub fn command(&mut self, error: &Vector6<R>, proportional: R, integral: R, period: R, frozen: bool) -> Vector6<R> {
@@ -65,22 +64,25 @@ impl<R: Real> ForceController<R> {
 
     /// The wrench that is to be applied (world axes), its force and its torque cut to `UNCONFIRMED` beyond what the
     /// environment presses back along them, as the sensor measures it; along a push to `GIVING` times the push, between
-    /// `UNCONFIRMED` and twice that. Their directions are kept.
+    /// five sixths of `UNCONFIRMED` and twice that. Their directions are kept.
     pub fn confirmed(&mut self, wanted: &Vector6<R>, measured: &Vector6<R>) -> Vector6<R> {
-        let (mut applied, zero) = (*wanted, R::constant(0.0));
+        let mut applied = *wanted;
         let before = self.confirmed.map_or([None; 2], |before| before.map(Some));
-        let rows =
-            self.confirmed.insert([zero; 2]).iter_mut().zip(before).zip(UNCONFIRMED).zip(CONFIRMATION).zip([0, 3]);
+        let rows = self
+            .confirmed
+            .insert([R::constant(0.0); 2])
+            .iter_mut()
+            .zip(before)
+            .zip(UNCONFIRMED)
+            .zip(CONFIRMATION)
+            .zip([0, 3]);
         for ((((confirmed, before), unconfirmed), rise), first) in rows {
             let mut part = applied.fixed_rows_mut::<3>(first);
             let (length, unconfirmed) = (sqrt(part.dot(&part)), R::constant(unconfirmed));
             if length > unconfirmed {
                 let push = part.dot(&measured.fixed_rows::<3>(first)) / length;
-                let now = if push > zero {
-                    at_least(at_most(push * R::constant(GIVING) - unconfirmed, unconfirmed), zero)
-                } else {
-                    -push
-                };
+                let given = at_most(push * R::constant(GIVING) - unconfirmed, unconfirmed);
+                let now = at_least(-push, given);
                 *confirmed = before.map_or(now, |before| at_most(now, before + R::constant(rise * PERIOD)));
                 let most = *confirmed + unconfirmed;
                 if length > most {
@@ -89,10 +91,5 @@ impl<R: Real> ForceController<R> {
             }
         }
         applied
-    }
-
-    /// Joint torque of a command in world axes: `J^T u`.
-    pub fn torque(jacobian: &Jacobian<R>, command: &Vector6<R>) -> JointTorques<R> {
-        JointTorques(jacobian.transpose_times(command))
     }
 }

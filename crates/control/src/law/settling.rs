@@ -24,7 +24,7 @@ use crate::time::PERIOD;
 use crate::units::{JOINTS, Vector7};
 
 /// Largest torque (N m): enough for friction that is 30 % more than the model's, with 20 % to spare.
-const CLAMP: [f64; JOINTS] = {
+pub(crate) const CLAMP: [f64; JOINTS] = {
     let mut clamp = wam7::FRICTION_COULOMB;
     let mut joint = 0;
     while joint < JOINTS {

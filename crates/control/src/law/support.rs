@@ -64,7 +64,7 @@ impl<R: Real> Support<R> {
     /// The force on the hand, as torque of the joints (N m).
     pub fn torque(&self, frames: &Frames<R>) -> Vector7<R> {
         let zero = R::constant(0.0);
-        frames.jacobian().transpose_times(&Vector6::new(zero, zero, self.force, zero, zero, zero))
+        frames.joint_torques(&Vector6::new(zero, zero, self.force, zero, zero, zero)).0
     }
 }
 

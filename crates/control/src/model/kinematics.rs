@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use crate::model::arm::ArmModel;
 use crate::real::{Real, at_least, sqrt};
-use crate::units::{JOINTS, JointPositions, JointVelocities, Orientation, Pose, Twist, Vector6, Vector7};
+use crate::units::{JOINTS, JointPositions, JointTorques, JointVelocities, Orientation, Pose, Twist, Vector6, Vector7};
 
 /// The geometric Jacobian: 6 rows (linear, angular; world axes), one column per joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -206,6 +206,18 @@ impl<R: Real> Frames<R> {
     /// Geometric Jacobian of the tool.
     pub fn jacobian(&self) -> Jacobian<R> {
         self.jacobian_at(&self.tool)
+    }
+
+    /// Torque (N m) with which the joints give this wrench at the tool (N, N m, world axes): `J^T w`, for which no
+    /// Jacobian has to be there.
+    pub fn joint_torques(&self, wrench: &Vector6<R>) -> JointTorques<R> {
+        let [fx, fy, fz, nx, ny, nz] = wrench.data.0[0];
+        let (force, moment) = (Vector3::new(fx, fy, fz), Vector3::new(nx, ny, nz));
+        let mut torques = Vector7::zeros();
+        for ((torque, axis), origin) in torques.iter_mut().zip(&self.axes).zip(&self.origins) {
+            *torque = axis.dot(&(moment + (self.tool - origin).cross(&force)));
+        }
+        JointTorques(torques)
     }
 
     fn jacobian_at(&self, point: &Vector3<R>) -> Jacobian<R> {

@@ -4,11 +4,8 @@ use control::command::{Command, Refusal, RunOptions};
 use control::time::periods;
 use control::{Event, Fault, State, flags};
 
-use crate::primitives::{Design, GOAL, START, primitive};
+use crate::primitives::{Design, GOAL, OUT, START, primitive};
 use crate::rig::Rig;
-
-/// Stretched out to the front.
-const OUT: [f64; 7] = [0.0, 1.45, 0.0, 0.1, 0.0, 0.0, 0.0];
 
 /// Postures to approach: all joints move.
 const TARGET: [f64; 7] = [0.5, 1.0, 0.6, 1.4, 0.5, 0.0, 0.4];

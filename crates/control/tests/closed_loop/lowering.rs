@@ -5,14 +5,11 @@ use control::time::periods;
 use control::{Event, Fault, State};
 use puck::SafetyMode;
 
-use crate::primitives::{Design, GOAL, START, primitive};
+use crate::primitives::{Design, GOAL, OUT, START, primitive};
 use crate::rig::Rig;
 
 /// Speed that the standards allow beside a person (m/s).
 const SLOW: f64 = 0.25;
-
-/// Stretched out to the front.
-const OUT: [f64; 7] = [0.0, 1.45, 0.0, 0.1, 0.0, 0.0, 0.0];
 
 fn hand_speed(rig: &Rig<f32>) -> f64 {
     rig.plant.frames().jacobian().twist(&rig.plant.dq).fixed_rows::<3>(0).norm()

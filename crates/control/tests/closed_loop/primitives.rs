@@ -18,6 +18,9 @@ use crate::rig::KERNELS;
 pub(crate) const START: [f64; 7] = [-0.20, 1.30, 1.20, 2.10, -0.30, -0.50, 1.40];
 pub(crate) const GOAL: [f64; 7] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
 
+/// Stretched out to the front.
+pub(crate) const OUT: [f64; 7] = [0.0, 1.45, 0.0, 0.1, 0.0, 0.0, 0.0];
+
 /// Largest displacement (m) and rotation (rad) of the test primitives by feedback.
 pub(crate) const DISPLACEMENT: f64 = 0.1;
 pub(crate) const ROTATION: f64 = 0.4;
