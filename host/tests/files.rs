@@ -74,6 +74,10 @@ fn no_command_replaces_a_file_unless_it_is_forced() {
     assert_eq!(names(at), ["demo.csv", "reach.toml", "there", "there.png"]);
     tactus(at, "plot -d demo.csv -o there.png --force").success();
     assert!(std::fs::read(at.join("there.png")).unwrap().starts_with(b"\x89PNG"));
+    // Capital letters make no other format; without the MuJoCo world there is no picture at all.
+    let drawn = tactus(at, "plot -r demo.csv -o way.SVG --picture way.PNG").get_output().clone();
+    let errors = String::from_utf8_lossy(&drawn.stderr).into_owned();
+    assert!(drawn.status.success() || errors.contains("E310"), "{errors}");
     tactus(at, &format!("{DEVICE} record --duration 1 -o there --force")).success();
     assert!(lab::demonstration::Recording::read(&at.join("there")).is_ok());
 }

@@ -51,17 +51,7 @@ fn observer<R: Real>(bencher: Bencher<'_, '_>) {
     let observer = core::cell::RefCell::new(MotionObserver::<R>::new());
     each::<R, _>(bencher, |model, q, frames| {
         let mut observer = observer.borrow_mut();
-        let state = JointState {
-            q: *q,
-            dq: JointVelocities(q.0),
-            missing: 0,
-            extrapolated: 0,
-            age: 0,
-            implausible: false,
-            stuck: false,
-            still: 0,
-            displaced: false,
-        };
+        let state = JointState::whole(*q, JointVelocities(q.0));
         observer.update(&state, false);
         let velocity = observer.velocity(&state, control::sense::observer::Trust::Compliant);
         observer.send(model, frames, &velocity, &q.0);

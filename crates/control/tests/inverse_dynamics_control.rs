@@ -11,17 +11,10 @@ use control::{Payload, model};
 fn the_torque_is_inertia_bias_feedback_and_friction() {
     let arm = ArmModel::<f64>::new(Payload::SensorAndHand);
     let gains = Gains::<f64>::tuned().stiff;
-    let state = JointState {
-        q: JointPositions::from_array([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]),
-        dq: JointVelocities::from_array([0.2, -0.1, 0.3, 0.4, -0.5, 0.6, -0.2]),
-        missing: 0,
-        extrapolated: 0,
-        age: 0,
-        implausible: false,
-        stuck: false,
-        still: 0,
-        displaced: false,
-    };
+    let state = JointState::whole(
+        JointPositions::from_array([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]),
+        JointVelocities::from_array([0.2, -0.1, 0.3, 0.4, -0.5, 0.6, -0.2]),
+    );
     let reference = JointReference {
         q: JointPositions(state.q.0 + Vector7::from([0.01, -0.02, 0.01, 0.02, -0.03, 0.01, 0.02])),
         dq: JointVelocities::from_array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]),

@@ -134,7 +134,8 @@ fn open_outputs(
 ) -> Result<(Vec<OutputFile>, Option<OutputFile>), Failure> {
     output_file::apart(command.output.iter().chain(&command.picture).map(PathBuf::as_path))
         .map_err(|error| files::failure(error, DOING))?;
-    if let Some(picture) = command.picture.as_ref().filter(|file| file.extension().is_none_or(|end| end != "png")) {
+    let is_png = |file: &Path| file.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
+    if let Some(picture) = command.picture.as_deref().filter(|file| !is_png(file)) {
         let cause = format!("{}: a picture is written as .png", picture.display());
         return Err(Failure::new(ErrorCode::FigureFormat, "plot refused", cause).help("name a file that ends in .png"));
     }

@@ -228,17 +228,7 @@ mod tests {
         fn calm() -> Self {
             let model = ArmModel::new(Payload::SensorAndHand);
             let q = JointPositions::from_array(POSTURE);
-            let state = JointState {
-                q,
-                dq: JointVelocities::zero(),
-                missing: 0,
-                extrapolated: 0,
-                age: 0,
-                implausible: false,
-                stuck: false,
-                still: 0,
-                displaced: false,
-            };
+            let state = JointState::whole(q, JointVelocities::zero());
             let transmission = Calibration::nominal(Payload::SensorAndHand).transmission;
             Scene {
                 bounds: JointBounds::around(&model, &q),

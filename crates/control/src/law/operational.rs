@@ -172,17 +172,7 @@ mod tests {
             posture: posture.0,
             posture_velocity: Vector7::zeros(),
         };
-        let state = JointState {
-            q: held,
-            dq: JointVelocities::zero(),
-            missing: 0,
-            extrapolated: 0,
-            age: 0,
-            implausible: false,
-            stuck: false,
-            still: 0,
-            displaced: false,
-        };
+        let state = JointState::whole(held, JointVelocities::zero());
         let (frames, gains) = (Frames::new(&model, &held), Gains::tuned().compliant);
         let mut controller = OperationalController::new(posture);
         for _ in 0..3000 {

@@ -139,17 +139,7 @@ mod tests {
 
     /// Every joint at 0.3 rad, with this speed (rad/s).
     fn moving(speed: f64) -> JointState<f64> {
-        JointState {
-            q: JointPositions(Vector7::repeat(0.3)),
-            dq: JointVelocities(Vector7::repeat(speed)),
-            missing: 0,
-            extrapolated: 0,
-            age: 0,
-            implausible: false,
-            stuck: false,
-            still: 0,
-            displaced: false,
-        }
+        JointState::whole(JointPositions(Vector7::repeat(0.3)), JointVelocities(Vector7::repeat(speed)))
     }
 
     /// The torque after so many seconds of this error (rad), closing at this speed (rad/s), and of this torque that is

@@ -98,6 +98,23 @@ pub struct JointState<R: Real> {
     pub displaced: bool,
 }
 
+impl<R: Real> JointState<R> {
+    /// All motors measured, moving and believed.
+    pub fn whole(q: JointPositions<R>, dq: JointVelocities<R>) -> Self {
+        JointState {
+            q,
+            dq,
+            missing: 0,
+            extrapolated: 0,
+            age: 0,
+            implausible: false,
+            stuck: false,
+            still: 0,
+            displaced: false,
+        }
+    }
+}
+
 /// Estimates joint positions and velocities from motor counts.
 #[derive(Clone, Debug)]
 pub struct JointEstimator<R: Real> {
@@ -262,17 +279,8 @@ impl<R: Real> JointEstimator<R> {
         }
         self.motors = Some(motors);
         let q = self.transmission.joint_from_motor(&angles.into());
-        Some(JointState {
-            q: JointPositions::from_array(q),
-            dq: JointVelocities::zero(),
-            missing: 0,
-            extrapolated: 0,
-            age: 0,
-            implausible: false,
-            stuck: false,
-            still: 0,
-            displaced: self.displaced,
-        })
+        let rest = JointState::whole(JointPositions::from_array(q), JointVelocities::zero());
+        Some(JointState { displaced: self.displaced, ..rest })
     }
 }
 

@@ -399,15 +399,8 @@ mod tests {
     /// A measured motion of all joints, in which so many motors stand and no joint is extrapolated.
     fn measured(q: f64, dq: f64, still: u8) -> JointState<f64> {
         JointState {
-            q: JointPositions(Vector7::repeat(q)),
-            dq: crate::units::JointVelocities(Vector7::repeat(dq)),
-            missing: 0,
-            extrapolated: 0,
-            age: 0,
-            implausible: false,
-            stuck: false,
             still,
-            displaced: false,
+            ..JointState::whole(JointPositions(Vector7::repeat(q)), crate::units::JointVelocities(Vector7::repeat(dq)))
         }
     }
 
