@@ -392,3 +392,37 @@ fn e7_what_is_carried_on_after_a_clear_goes_with_the_load() {
         assert!(speed < 0.25, "{speed} m/s");
     }
 }
+
+/// The change that makes it fail: a compliant run drops at once what its hold carried beyond friction.
+#[test]
+fn e7_a_run_behind_a_stop_lets_its_load_sink_slowly_and_does_not_feel_for_it() {
+    let stiff = RunOptions::default();
+    let compliant = RunOptions { compliant: true, ..stiff };
+    for q in [OUT, START, GOAL] {
+        for (tared, options) in [
+            (false, stiff),
+            (false, compliant),
+            (true, RunOptions { force_control: true, ..compliant }),
+            (true, RunOptions { force_control: true, feedback: true, ..compliant }),
+            (true, RunOptions { force_control: true, ..stiff }),
+        ] {
+            let mut rig = stopped_under_a_kilogram(q, Fault::MotorHot);
+            rig.command(Command::ClearFault);
+            rig.command(Command::Hold);
+            rig.run_for(1.0);
+            let (here, expected) = (rig.plant.q.into(), Some([0.0; 6]));
+            let staying = Design { duration: 4.0, bent: false, start: here, goal: here, expected, ..Design::default() };
+            rig.load(&primitive(&staying)).expect("loads");
+            if tared {
+                // What hangs there is no sensor's error until a person says so.
+                assert_eq!(rig.tick(Some(Command::Run(options))).event, Some(Event::Refused(Refusal::ForceAtRest)));
+                rig.command(Command::Tare);
+            }
+            rig.command(Command::Run(options));
+            let speed = fastest(&mut rig, 5.0);
+            println!("{q:?}, {options:?}: {speed:.2} m/s, {:?}", rig.cycle.state());
+            assert!(speed < SLOW, "{options:?}: {speed} m/s");
+            assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None));
+        }
+    }
+}
