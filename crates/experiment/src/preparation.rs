@@ -38,18 +38,20 @@ const OPEN: f64 = 0.25;
 /// The same for an object that may stand beside the palm: as wide as the fingers go without touching their stops, 12
 /// cm to either side.
 const WIDE_OPEN: f64 = 0.05;
-/// Part of the dwell in which the fingers move.
+/// Time for the fingers to close where the hand rests, s: slow enough not to strike what they meet.
+const CLOSING_SECONDS: f64 = 7.0;
+/// The same in a movement that lifts by itself: its teacher rests for no longer.
+const LIFTING_SECONDS: f64 = 3.5;
+/// Part of that time in which the fingers move.
 const CLOSING: [f64; 2] = [0.06, 0.94];
 /// Kernels of a movement that lifts by itself.
 const LIFTING_KERNELS: usize = 100;
 /// Rehearsals.
 const REHEARSALS: u64 = 3;
 
-/// Closing and compliance of a scenario's hand: one set for all its cells and modes, chosen for what it meets.
+/// Compliance of a scenario's hand: one set for all its cells and modes, chosen for what it meets.
 #[derive(Debug, Clone, Copy)]
 struct GraspTuning {
-    /// Time for the fingers to close where the hand rests, s.
-    closing: f64,
     /// Where the fingers close to if nothing stops them, rad.
     closed: f64,
     /// K1/K of the position rows sideways and upwards, m/N; `None`: as recommended.
@@ -62,21 +64,18 @@ struct GraspTuning {
 
 impl GraspTuning {
     fn of(scenario: Scenario) -> GraspTuning {
-        let usual = GraspTuning { closing: 3.5, closed: 2.35, compliance: None, turns: true, fingers: None };
+        let usual = GraspTuning { closed: 2.35, compliance: None, turns: true, fingers: None };
         // A light cup slides at 1 N: half of that must bend the plan by its whole reach, and 0.3 N of it are the dead
         // band.
         let light = Some([2.0, 0.0]);
         match scenario {
             Scenario::Flashlight | Scenario::Lift => usual,
             Scenario::Cup => GraspTuning { compliance: light, ..usual },
-            // What is in the way is below: the hand gives way upwards and nowhere else. Fingers that sweep along a
-            // table take their time.
-            Scenario::Bottle => GraspTuning { closing: 7.0, compliance: Some([0.0, 0.5]), turns: false, ..usual },
-            // What a finger can crush is touched slowly, and the plan of the fingers is quick enough (K) and gives
-            // way enough (K1) to end where they touch. They close to 0.4 rad beyond the cup, in both modes.
-            Scenario::Fingers => {
-                GraspTuning { closing: 7.0, closed: 1.95, compliance: light, fingers: Some([2400.0, 3.0]), ..usual }
-            }
+            // What is in the way is below: the hand gives way upwards and nowhere else.
+            Scenario::Bottle => GraspTuning { compliance: Some([0.0, 0.5]), turns: false, ..usual },
+            // The plan of fingers that can crush what they touch is quick enough (K) and gives way enough (K1) to end
+            // where they touch. They close to 0.4 rad beyond the cup, in both modes.
+            Scenario::Fingers => GraspTuning { closed: 1.95, compliance: light, fingers: Some([2400.0, 3.0]), ..usual },
         }
     }
 }
@@ -251,12 +250,13 @@ fn learn(teaching: Teaching, recording: &Recording, file: &Path) -> Result<Primi
     let Teaching { scenario, speed, .. } = teaching;
     let shown = Demonstration::prepare(recording, &Preparation::default())?.duration() / speed;
     let tuning = GraspTuning::of(scenario);
-    let dwell = if scenario.lifts_itself() { 0.0 } else { tuning.closing };
+    let (closing, dwell) =
+        if scenario.lifts_itself() { (LIFTING_SECONDS, 0.0) } else { (CLOSING_SECONDS, CLOSING_SECONDS) };
     let movement = scenario.taught_movement();
     // Within the demonstration the hand rests from its arrival on; people need a moment longer than the path that they
     // follow.
     let arrival = movement.arrival() / movement.path().duration() * shown;
-    let closes = CLOSING.map(|share| (arrival + share * tuning.closing) / (shown + dwell));
+    let closes = CLOSING.map(|share| (arrival + share * closing) / (shown + dwell));
     let fingers = |angle: f64| [0.0, angle, angle, angle];
     let usual = LearnOptions::named(scenario.name());
     let options = LearnOptions {

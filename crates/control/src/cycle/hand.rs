@@ -6,7 +6,7 @@ use crate::act::hand::{HandLimiter, LimitedHandTorques, TORQUE_LIMIT};
 use crate::law::gains::HandGains;
 use crate::law::hand::HandController;
 use crate::model::hand::{DIGITS, FINGERS, ranges};
-use crate::plan::hand::HandMotion;
+use crate::plan::hand::{Grasp, HandMotion};
 use crate::plan::reference::HandReference;
 use crate::real::Real;
 use crate::sense::hand::{HandEstimator, HandState};
@@ -16,9 +16,12 @@ use crate::time::periods;
 /// Time for which the hand is still driven after a move that nothing follows: 0.5 s, in control periods.
 const SETTLING: u16 = periods(0.5);
 
-/// A finger that is this far behind its plan on the closing side stands on something (rad): in free motion it is 0.03
-/// behind.
-const HELD_UP: f64 = 0.1;
+/// A finger that is this far behind its plan on the closing side stands on something (rad): in free motion it is at
+/// most 0.03 behind.
+const HELD_UP: f64 = 0.05;
+
+/// Planned speed from which on a finger closes (rad/s).
+const CLOSING: f64 = 0.1;
 
 /// Aim of the hand.
 #[derive(Clone, Copy, Debug)]
@@ -137,13 +140,19 @@ impl<R: Real> HandDrive<R> {
         self.expected = expected;
     }
 
-    /// True while two fingers or more stand on something on their way along a plan. Not inlined: the small fast memory
-    /// of a board is full.
+    /// Returns what the hand does with what is between its fingers. Not inlined: the small fast memory of a board is
+    /// full.
     #[inline(never)]
-    pub fn is_gripping(&self) -> bool {
-        let (Aim::Follow(reference), Some(state)) = (&self.aim, &self.state) else { return false };
+    pub fn grasp(&self) -> Grasp {
+        let (Aim::Follow(reference), Some(state)) = (&self.aim, &self.state) else { return Grasp::Open };
         let behind = reference.q.iter().zip(&state.q).skip(1).map(|(wanted, found)| *wanted - *found);
-        behind.filter(|behind| *behind > R::constant(HELD_UP)).count() > 1
+        if behind.filter(|behind| *behind > R::constant(HELD_UP)).count() > 1 {
+            Grasp::Gripping
+        } else if reference.dq.iter().skip(1).any(|speed| *speed > R::constant(CLOSING)) {
+            Grasp::Closing
+        } else {
+            Grasp::Open
+        }
     }
 
     /// Keeps the last reference, at rest: what is gripped stays gripped.

@@ -8,6 +8,7 @@ use crate::guard::monitor::{TIP_REACH, TIP_SPEED_LIMIT, TRACKING_LIMIT};
 use crate::law::gains::Tracking;
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
+use crate::plan::hand::Grasp;
 use crate::plan::primitive::posture_and_hand;
 use crate::plan::reference::{HandReference, JointReference, TaskReference};
 use crate::plan::run::Senses;
@@ -234,7 +235,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let (options, tracking) = (run.options, self.gains.tracking(run.options.compliant));
         let hand = self.hand.answering().filter(HandState::feels);
         let gauges = hand.as_ref().map(|hand| &hand.gauges);
-        let Ok(plan) = run.step(primitive, &measured.wrench, gauges, self.hand.is_gripping(), senses) else {
+        let grasp = self.hand.grasp();
+        let Ok(plan) = run.step(primitive, &measured.wrench, gauges, grasp, senses) else {
             return self.float(measured);
         };
         if senses == Senses::Fresh {
@@ -290,7 +292,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         set |= if operational.is_clamped() { flags::CLAMPED } else { 0 };
         let free = senses == Senses::Fresh && drift.is_free() && !self.cut.is_cut();
         if options.compliant {
-            if self.hand.is_gripping() {
+            if grasp == Grasp::Gripping {
                 settling.fade();
             } else if free {
                 settling.step(&tracking.stiffness, measured.state, &reference, |joint| handover.fall(joint));

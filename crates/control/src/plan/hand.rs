@@ -6,6 +6,17 @@ use crate::plan::reference::HandReference;
 use crate::real::{Real, at_least, at_most};
 use crate::time::RATE;
 
+/// Relation of the hand to what it closes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grasp {
+    /// No finger closes, and at most one stands on something.
+    Open,
+    /// A finger closes along a plan.
+    Closing,
+    /// Two fingers or more stand on something on their way along a plan.
+    Gripping,
+}
+
 /// Longest move that may be asked for (s).
 pub const LONGEST_MOVE: f64 = 60.0;
 

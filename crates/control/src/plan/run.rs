@@ -7,6 +7,7 @@ use crate::command::{Goal, Refusal, RunOptions};
 use crate::guard::watch::{Surprise, Watch};
 use crate::plan::brake::brake;
 use crate::plan::goal::GoalFilter;
+use crate::plan::hand::Grasp;
 use crate::plan::load::within_reach;
 use crate::plan::primitive::{Coupling, Primitive, Reference, Rollout, StartState, configuration, posture_and_hand};
 use crate::real::{Real, at_least};
@@ -49,6 +50,9 @@ pub(crate) const FADE: u16 = periods(0.1);
 /// Largest distance of a digit of the hand from where the primitive starts (rad).
 const HAND_DISTANCE: f64 = 0.15;
 
+/// Speed of the plan up to which a hand that closes stands (m/s): what it closes on leads it, and nobody approaches so.
+const STANDING: f64 = 0.02;
+
 /// Control periods after which another period of braking is allowed: a touch is braked, and what swings is not. Without
 /// friction a plan that brakes all the time drives the cable of J1.
 const BRAKING: u16 = 20;
@@ -76,10 +80,10 @@ pub(crate) struct Run<R: Real, const N: usize> {
     /// Feedback as computed last, before it fades.
     coupling: Coupling<R>,
     deviation: Option<Deviation<R>>,
-    /// The filtered deviation, by which a compliant run bends, and any run in which the hand grips.
+    /// The filtered deviation, by which a compliant run bends, and any run in which the hand grasps.
     smoothed: SmoothedWrench<R>,
-    /// True while the hand holds something.
-    gripping: bool,
+    /// True while the hand holds something, or closes where it stands.
+    grasps: bool,
     watch: Watch<R>,
     /// Control periods of fading left: `FADE` in full, 0 gone.
     kept: u16,
@@ -140,7 +144,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             coupling: Coupling::NONE,
             deviation: None,
             smoothed: SmoothedWrench::new(),
-            gripping: false,
+            grasps: false,
             watch: Watch::new(),
             kept: FADE,
             settled: false,
@@ -171,10 +175,10 @@ impl<R: Real, const N: usize> Run<R, N> {
         Ok(())
     }
 
-    /// The deviation as force control takes it: while the hand holds something, without what swings. The inertia of an
-    /// object behind the sensor would drive the cables.
+    /// The deviation as force control takes it: while the hand grasps, without what swings. The inertia of an object
+    /// behind the sensor would drive the cables, and fingers that clamp make a contact too stiff for the fast path.
     pub(crate) fn steadied(&self) -> Option<Deviation<R>> {
-        self.deviation.map(|deviation| if self.gripping { deviation.smoothed(&self.smoothed) } else { deviation })
+        self.deviation.map(|deviation| if self.grasps { deviation.smoothed(&self.smoothed) } else { deviation })
     }
 
     /// True while the goal is on its way to the one that was commanded.
@@ -223,6 +227,13 @@ impl<R: Real, const N: usize> Run<R, N> {
         }
     }
 
+    /// True if the plan of the hand moves by no more than what it closes on makes it.
+    fn stands(&self, primitive: &Primitive<R, N>) -> bool {
+        let velocity = Vector3::from(self.rollout.scaled_velocities()[0])
+            * (primitive.movement().rate() * self.rollout.speed() * R::constant(1.0 / STANDING));
+        velocity.dot(&velocity) < R::constant(1.0)
+    }
+
     fn is_finished(&self) -> bool {
         self.rollout.is_finished() && self.rollout.progress() >= self.end
     }
@@ -245,7 +256,7 @@ impl<R: Real, const N: usize> Run<R, N> {
         let _ = self.set_speed(primitive, self.speed.0);
     }
 
-    /// The plan of this tick; `gripping` tells that the hand holds something.
+    /// The plan of this tick; `grasp` is that of the hand.
     ///
     /// # Errors
     /// [`RolloutError::OtherPrimitive`]: this is not the primitive that the run was started with.
@@ -254,10 +265,12 @@ impl<R: Real, const N: usize> Run<R, N> {
         primitive: &Primitive<R, N>,
         wrench: &Wrench<R>,
         gauges: Option<&[R; 3]>,
-        gripping: bool,
+        grasp: Grasp,
         senses: Senses,
     ) -> Result<Reference<R>, RolloutError> {
-        self.gripping = gripping;
+        // A hand that closes on its way meets what is in that way as an open one does.
+        self.grasps = grasp == Grasp::Gripping || grasp == Grasp::Closing && self.stands(primitive);
+        let grasps = self.grasps;
         self.kept = match senses {
             Senses::Lost => self.kept.saturating_sub(1),
             _ => FADE.min(self.kept + 1),
@@ -267,7 +280,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             self.deviation =
                 primitive.expected().map(|expected| Deviation::new(&expected.at(progress), wrench, gauges));
             if let Some(deviation) = &self.deviation {
-                self.smoothed.step(wrench, &deviation.expected, gripping);
+                self.smoothed.step(wrench, &deviation.expected, grasps);
             }
         }
         let bends = self.options.feedback && !self.settled;
@@ -275,7 +288,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             // What swings is an arm that follows softly, or that holds something; a stiff one meets hard things, where
             // each millisecond counts.
             let mut seen =
-                if self.options.compliant || gripping { deviation.smoothed(&self.smoothed) } else { deviation };
+                if self.options.compliant || grasps { deviation.smoothed(&self.smoothed) } else { deviation };
             if !self.options.finger_feedback {
                 seen.gauges = [R::constant(0.0); 3];
             }
@@ -294,7 +307,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             let kept = self.kept();
             coupling = coupling.map(|value| value * kept);
         }
-        if senses == Senses::Fresh && self.options.compliant && !gripping && self.bends(primitive) {
+        if senses == Senses::Fresh && self.options.compliant && !grasps && self.bends(primitive) {
             self.brake(primitive, &mut coupling);
         }
         let plan = self.rollout.step(primitive.movement(), R::constant(PERIOD), &coupling)?;

@@ -7,7 +7,7 @@ use control::time::periods;
 use control::{Calibration, Event, PERIOD, Payload, Refusal, State, flags};
 
 use crate::hand_plant::Hand;
-use crate::primitives::{Design, START, primitive};
+use crate::primitives::{Design, GOAL, START, primitive};
 use crate::rig::Rig;
 
 const OPEN: [f64; 4] = [0.0, 0.25, 0.25, 0.25];
@@ -181,28 +181,33 @@ fn closing_on_an_object_reads_as_a_negative_gauge_whatever_its_zero() {
     }
 }
 
-/// Swing of the torque of J1 (N m) under force control while the sensor feels 2 N sideways that swing at 20 Hz; with
-/// something in the hand, or nothing.
-fn swing(held: bool) -> f64 {
+/// Torques of J1 (N m) in a compliant run under force control, for 0.3 s from so many seconds after its beginning on,
+/// while the sensor feels this force (N) sideways that has swung at 20 Hz for half a second; with something in the
+/// hand, or nothing.
+fn torques(design: &Design, held: bool, from: f64, newtons: f64) -> Vec<f64> {
     let mut rig = holding();
     if held {
         rig.plant.hand.as_mut().expect("fitted").object = [Some((1.0, 30.0)); 3];
     }
-    rig.load(&primitive(&closing(1.6, [0.0; 3]))).expect("loads");
+    rig.load(&primitive(design)).expect("loads");
     let options = RunOptions { force_control: true, compliant: true, ..RunOptions::default() };
     rig.command(Command::Run(options));
-    rig.run_for(2.0);
-    let mut torques = Vec::new();
-    for cycle in 0..periods(0.8) {
-        rig.plant.push[1] = 2.0 * (f64::from(cycle) * PERIOD * 20.0 * std::f64::consts::TAU).sin();
+    // The first half second is for what is slow.
+    rig.run_for(from - 0.5);
+    let torque = |cycle| {
+        rig.plant.push[1] = newtons * (f64::from(cycle) * PERIOD * 20.0 * std::f64::consts::TAU).sin();
         let record = rig.tick(None).record;
         assert_eq!(record.state, State::Run);
-        // The first half second is for what is slow.
-        if f64::from(cycle) * PERIOD > 0.5 {
-            torques.push(f64::from(record.tau[0]));
-        }
-    }
-    let [low, high] = [f64::min, f64::max].map(|pick| torques.iter().copied().reduce(pick).expect("some"));
+        f64::from(record.tau[0])
+    };
+    (0..periods(0.8)).map(torque).skip(usize::from(periods(0.5))).collect()
+}
+
+/// Swing of the torque of J1 (N m) that 2 N make; see [`torques`].
+fn swing(design: &Design, held: bool, from: f64) -> f64 {
+    let still = torques(design, held, from, 0.0);
+    let moved = torques(design, held, from, 2.0).into_iter().zip(still).map(|(moved, still)| moved - still);
+    let (low, high) = moved.fold((f64::MAX, f64::MIN), |(low, high), torque| (low.min(torque), high.max(torque)));
     high - low
 }
 
@@ -210,9 +215,24 @@ fn swing(held: bool) -> f64 {
 /// 20 Hz. The change that makes it fail: Eq (12) takes what swings while something is gripped.
 #[test]
 fn g10_a_force_that_swings_in_a_grip_is_not_pressed_against() {
-    let (held, free) = (swing(true), swing(false));
+    let design = closing(1.6, [0.0; 3]);
+    let (held, free) = (swing(&design, true, 2.5), swing(&design, false, 2.5));
     println!("{held} N m, {free} N m with nothing in the hand");
     assert!(free > 0.5 && held < 0.3 * free, "{held} N m, {free} N m with nothing in the hand");
+}
+
+/// Fingers that clamp make a contact that is too stiff for the fast path of Eq (12): J1 swung at 16 Hz with up to 4 N
+/// until two of them counted as held up. A hand that closes on its way meets what is in the way, and shall feel that.
+///
+/// The changes that make it fail: a hand that closes is an open one; one that closes on its way is not.
+#[test]
+fn g10_a_force_that_swings_while_the_hand_closes_where_it_stands_is_not_pressed_against() {
+    let standing = closing(1.6, [0.0; 3]);
+    let moving = Design { goal: GOAL, ..closing(1.6, [0.0; 3]) };
+    let open = Design { goal: GOAL, ..closing(0.0, [0.0; 3]) };
+    let [standing, moving, open] = [standing, moving, open].map(|design| swing(&design, false, 1.3));
+    println!("{standing} N m where it stands, {moving} on its way, {open} with an open hand");
+    assert!(open > 0.5 && moving > 0.9 * open && standing < 0.3 * open, "{standing} {moving} {open}");
 }
 
 /// Torque with which F2 presses on an object at the end of a run that closes on it.
