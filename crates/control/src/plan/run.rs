@@ -82,7 +82,7 @@ pub(crate) struct Run<R: Real, const N: usize> {
     deviation: Option<Deviation<R>>,
     /// The filtered deviation, by which a compliant run bends, and any run in which the hand grasps.
     smoothed: SmoothedWrench<R>,
-    /// True while the hand holds something, or closes where it stands.
+    /// True while the hand holds something, or closes where it stands in a compliant run.
     grasps: bool,
     watch: Watch<R>,
     /// Control periods of fading left: `FADE` in full, 0 gone.
@@ -268,8 +268,10 @@ impl<R: Real, const N: usize> Run<R, N> {
         grasp: Grasp,
         senses: Senses,
     ) -> Result<Reference<R>, RolloutError> {
-        // A hand that closes on its way meets what is in that way as an open one does.
-        self.grasps = grasp == Grasp::Gripping || grasp == Grasp::Closing && self.stands(primitive);
+        // A hand that closes on its way meets what is in that way as an open one does; a stiff one that closes along
+        // a table has to give way at once.
+        let clamps = grasp == Grasp::Closing && self.options.compliant && self.stands(primitive);
+        self.grasps = grasp == Grasp::Gripping || clamps;
         let grasps = self.grasps;
         self.kept = match senses {
             Senses::Lost => self.kept.saturating_sub(1),
