@@ -16,9 +16,12 @@ use crate::time::periods;
 /// Time for which the hand is still driven after a move that nothing follows: 0.5 s, in control periods.
 const SETTLING: u16 = periods(0.5);
 
-/// A finger that is this far behind its plan on the closing side stands on something (rad): in free motion it is at
-/// most 0.03 behind.
+/// A finger that is this far behind its plan on the closing side stands on something (rad), if it stands: in free
+/// motion it is at most 0.03 behind, and with more friction than the model's as far as that makes it.
 const HELD_UP: f64 = 0.05;
+
+/// Part of its planned speed, and speed beyond that (rad/s), below which a finger stands.
+const STANDS: (f64, f64) = (0.5, 0.1);
 
 /// Planned speed from which on a finger closes (rad/s).
 const CLOSING: f64 = 0.1;
@@ -145,8 +148,13 @@ impl<R: Real> HandDrive<R> {
     #[inline(never)]
     pub fn grasp(&self) -> Grasp {
         let (Aim::Follow(reference), Some(state)) = (&self.aim, &self.state) else { return Grasp::Open };
-        let behind = reference.q.iter().zip(&state.q).skip(1).map(|(wanted, found)| *wanted - *found);
-        if behind.filter(|behind| *behind > R::constant(HELD_UP)).count() > 1 {
+        let found = state.q.iter().zip(&state.dq);
+        let fingers = reference.q.iter().zip(&reference.dq).zip(found).skip(1);
+        let held_up = fingers.filter(|((wanted, plan), (found, speed))| {
+            **wanted - **found > R::constant(HELD_UP)
+                && **speed < **plan * R::constant(STANDS.0) + R::constant(STANDS.1)
+        });
+        if held_up.count() > 1 {
             Grasp::Gripping
         } else if reference.dq.iter().skip(1).any(|speed| *speed > R::constant(CLOSING)) {
             Grasp::Closing

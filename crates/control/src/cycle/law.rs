@@ -9,6 +9,7 @@ use crate::law::integral::PostureIntegral;
 use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
 use crate::law::settling::{CLAMP, Settling};
+use crate::law::spring::{LET_GO, reach};
 use crate::law::support::Support;
 use crate::model::friction;
 use crate::plan::approach::Approach;
@@ -17,17 +18,10 @@ use crate::real::{Real, at_least, at_most, sqrt, within};
 use crate::sense::drift::Drift;
 use crate::sense::joints::JointState;
 use crate::time::{PERIOD, periods};
-use crate::units::{JOINTS, JointPositions, JointTorques, JointVelocities, Vector7};
+use crate::units::{JointPositions, JointTorques, JointVelocities, Vector7};
 
 /// Speed at which a held posture returns after somebody pushed the arm away from it (rad/s).
 const RETURN_SPEED: f64 = 0.2;
-
-/// Speeds of a joint on its way back to a posture that has given way, between which the spring is let go of (rad/s):
-/// lower where the whole arm is the lever, which makes 0.25 m/s of 0.28 rad/s.
-const LET_GO: [(f64, f64); JOINTS] = {
-    let (arm, wrist) = ((0.12, 0.25), (0.15, 0.35));
-    [arm, arm, arm, arm, wrist, wrist, wrist]
-};
 
 /// The law of a state.
 #[allow(
@@ -164,13 +158,8 @@ impl<R: Real> Posture<R> {
         let step = R::constant(RETURN_SPEED * PERIOD);
         let back = (self.q.0 - self.held.0).map(|way| within(way, step));
         let mut offset = (self.held.0 + back - q.0).zip_map(clamp, within);
-        for ((joint, offset), (slow, fast)) in offset.iter_mut().enumerate().zip(LET_GO) {
-            let (speed, zero) = (dq.0[joint], R::constant(0.0));
-            let along = if *offset < zero { -speed } else { speed };
-            if along > R::constant(slow) {
-                let share = at_least((R::constant(fast) - along) * R::constant(1.0 / (fast - slow)), zero);
-                *offset = within(*offset, share * clamp[joint]);
-            }
+        for (((offset, speed), clamp), let_go) in offset.iter_mut().zip(dq.0.iter()).zip(clamp.iter()).zip(LET_GO) {
+            *offset = within(*offset, reach(*offset, *speed, *clamp, let_go));
         }
         let held = q.0 + offset;
         // Exactly, where nobody pushes: a sum of differences is not.

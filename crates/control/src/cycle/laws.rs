@@ -251,14 +251,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             deviation.map(|deviation| deviation.expected_gauges),
         );
         let task = TaskReference::from_plan(&plan);
-        let reference = operational.step(
-            &self.model,
-            tracking,
-            measured.frames,
-            measured.state,
-            &task,
-            (options.pose_feedback, options.acceleration),
-        );
+        let lets_go = drift.is_free() || !(options.feedback || options.force_control);
+        let how = (options.pose_feedback, options.acceleration, lets_go);
+        let reference = operational.step(&self.model, tracking, measured.frames, measured.state, &task, how);
         if run.goal_moves() {
             // A goal that the joints cannot follow is not led away from the tool.
             let behind = lag.distance * R::constant(1.0 / TRACKING_LIMIT);
@@ -292,7 +287,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         set |= if operational.is_clamped() { flags::CLAMPED } else { 0 };
         let free = senses == Senses::Fresh && drift.is_free() && !self.cut.is_cut();
         if options.compliant {
-            if grasp == Grasp::Gripping {
+            if grasp == Grasp::Gripping || operational.is_drawn() {
                 settling.fade();
             } else if free {
                 settling.step(&tracking.stiffness, measured.state, &reference, |joint| handover.fall(joint));

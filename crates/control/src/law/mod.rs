@@ -9,6 +9,7 @@ pub mod integral;
 pub mod joint;
 pub mod operational;
 pub mod settling;
+pub(crate) mod spring;
 pub mod support;
 pub mod window;
 

@@ -1,8 +1,8 @@
 //! `OperationalController`: the plan of the tool becomes a plan of the joints.
 //!
 //! Eq (11): `dq_d = J^+ (dx_d + K_x (x_d - x)) + K_post (I - J^+ J)(q_post - q)`, `J^+` damped. `q_d` is its integral,
-//! kept within a clamp of the measured `q` (anti-windup: blocked by contact, the integral would grow without bound).
-//! `x` and `q` are measured, or both those of `q_d`.
+//! kept within a clamp of the measured `q`: blocked by contact, the integral would grow without bound, and an arm that
+//! was pushed away would be thrown back. `x` and `q` are measured, or both those of `q_d`.
 //! `ddq_d` is
 //! `J^+ (ddx_d + K_x (dx_d - dx) - dJ dq) + (I - J^+ J) K_post (dq_post - dq)`, or the low-passed derivative of `dq_d`.
 //! The orientation error is `2 vec(q_d (x) conj(q))`, sign-aligned, in world axes, as the Jacobian's angular rows are.
@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 
 use crate::command::{AccelerationSource, PoseFeedback};
 use crate::law::gains::Tracking;
+use crate::law::spring::{self, LET_GO};
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
 use crate::plan::reference::{JointReference, TaskReference};
@@ -18,7 +19,7 @@ use crate::real::{Real, at_least, at_most, sqrt};
 use crate::sense::filter::{Butterworth, LowPass};
 use crate::sense::joints::JointState;
 use crate::time::{PERIOD, RATE};
-use crate::units::{JOINTS, JointAccelerations, JointPositions, JointVelocities, Vector6};
+use crate::units::{JOINTS, JointAccelerations, JointPositions, JointVelocities, Vector6, Vector7};
 
 /// Cut-off of the differentiated acceleration (Hz).
 const ACCELERATION_CUT_OFF: f64 = 15.0;
@@ -27,6 +28,11 @@ const ACCELERATION_CUT_OFF: f64 = 15.0;
 /// not snap back.
 const CORRECTION_SPEED: (f64, f64) = (0.2, 1.0);
 
+/// Distance of `q_d` from which on a spring is drawn (rad), which nothing but a push or an obstacle does, and below
+/// which it no longer is.
+const DRAWN: f64 = 0.1;
+const RELAXED: f64 = 0.03;
+
 /// Eq (11), with `q_d` as its state.
 #[derive(Clone, Debug)]
 pub struct OperationalController<R: Real> {
@@ -34,6 +40,8 @@ pub struct OperationalController<R: Real> {
     dq_d: JointVelocities<R>,
     derivative: LowPass<R, JOINTS>,
     clamped: bool,
+    /// Joints whose springs something has drawn, one bit each, J1 lowest.
+    drawn: u8,
     lag: R,
 }
 
@@ -45,6 +53,7 @@ impl<R: Real> OperationalController<R> {
             dq_d: JointVelocities::zero(),
             derivative: LowPass::new(Butterworth::new(ACCELERATION_CUT_OFF, RATE)),
             clamped: false,
+            drawn: 0,
             lag: R::constant(0.0),
         }
     }
@@ -59,12 +68,17 @@ impl<R: Real> OperationalController<R> {
         self.clamped
     }
 
+    /// True if something has drawn a spring that is let go of.
+    pub fn is_drawn(&self) -> bool {
+        self.drawn != 0
+    }
+
     /// Speed of the tool against that of the plan in the last tick (m/s).
     pub fn lag(&self) -> R {
         self.lag
     }
 
-    /// One tick. `frames` are those of the measured posture.
+    /// One tick. `frames` are those of the measured posture; with the last of the options a drawn spring is let go of.
     pub fn step(
         &mut self,
         model: &ArmModel<R>,
@@ -72,7 +86,7 @@ impl<R: Real> OperationalController<R> {
         frames: &Frames<R>,
         state: &JointState<R>,
         task: &TaskReference<R>,
-        (feedback, acceleration): (PoseFeedback, AccelerationSource),
+        (feedback, acceleration, lets_go): (PoseFeedback, AccelerationSource, bool),
     ) -> JointReference<R> {
         let planned;
         let (frames, dq) = match feedback {
@@ -89,7 +103,6 @@ impl<R: Real> OperationalController<R> {
             let (linear, angular) = (linear * gains.position, angular * gains.orientation);
             Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
         };
-
         let (offset, turn) = (task.pose.position - pose.position, pose.orientation.error_to(&task.pose.orientation));
         let correction = gain(
             within_length(offset, R::constant(CORRECTION_SPEED.0) / gains.position),
@@ -130,6 +143,9 @@ impl<R: Real> OperationalController<R> {
             self.clamped |= kept != *desired;
             *desired = kept;
         }
+        if lets_go {
+            self.let_go(&mut q_d, state, &planned, &gains.clamp);
+        }
         // Feedback beyond a soft limit is not wanted of this joint: the arm gives way as far as it can, and does not
         // stop.
         let limits = model.soft_min.iter().zip(&model.soft_max);
@@ -142,6 +158,25 @@ impl<R: Real> OperationalController<R> {
         }
         self.q_d = JointPositions(q_d);
         JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d), planned: JointVelocities(planned) }
+    }
+
+    /// Lets go of the springs, between the joints and `q_d` (rad), that something has drawn and whose joints come back
+    /// faster than `planned` (rad/s).
+    #[inline(never)]
+    fn let_go(&mut self, q_d: &mut Vector7<R>, state: &JointState<R>, planned: &Vector7<R>, clamp: &Vector7<R>) {
+        let (mut drawn, mut bit) = (0, 1);
+        let joints = q_d.iter_mut().zip(state.q.0.iter()).zip(state.dq.0.iter().zip(planned.iter()));
+        for ((((desired, q), (dq, planned)), clamp), let_go) in joints.zip(clamp.iter()).zip(LET_GO) {
+            let offset = *desired - *q;
+            let far = R::constant(if self.drawn & bit == 0 { DRAWN } else { RELAXED });
+            if offset > far || offset < -far {
+                drawn |= bit;
+                let reach = spring::reach(offset, *dq - *planned, *clamp, let_go);
+                *desired = at_most(at_least(*desired, *q - reach), *q + reach);
+            }
+            bit <<= 1;
+        }
+        self.drawn = drawn;
     }
 }
 
@@ -156,7 +191,6 @@ mod tests {
     use super::*;
     use crate::law::gains::Gains;
     use crate::model::calibration::Payload;
-    use crate::units::Vector7;
 
     /// Farthest joint of `q_d` from the posture that a plan at rest prefers (rad), after ten seconds in which friction
     /// holds J5 a tenth of a radian beside it.
@@ -176,7 +210,7 @@ mod tests {
         let (frames, gains) = (Frames::new(&model, &held), Gains::tuned().compliant);
         let mut controller = OperationalController::new(posture);
         for _ in 0..3000 {
-            controller.step(&model, &gains, &frames, &state, &task, (feedback, AccelerationSource::Analytic));
+            controller.step(&model, &gains, &frames, &state, &task, (feedback, AccelerationSource::Analytic, true));
         }
         (controller.q_d().0 - posture.0).amax()
     }

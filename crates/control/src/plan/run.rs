@@ -50,8 +50,11 @@ pub(crate) const FADE: u16 = periods(0.1);
 /// Largest distance of a digit of the hand from where the primitive starts (rad).
 const HAND_DISTANCE: f64 = 0.15;
 
-/// Speed of the plan up to which a hand that closes stands (m/s): what it closes on leads it, and nobody approaches so.
+/// Speed of the plan up to which a hand that begins to close stands (m/s): nobody approaches so.
 const STANDING: f64 = 0.02;
+
+/// Speed of the plan above which a hand that closes no longer stands (m/s): what it closes on leads it.
+const LEADING: f64 = 0.1;
 
 /// Control periods after which another period of braking is allowed: a touch is braked, and what swings is not. Without
 /// friction a plan that brakes all the time drives the cable of J1.
@@ -229,8 +232,9 @@ impl<R: Real, const N: usize> Run<R, N> {
 
     /// True if the plan of the hand moves by no more than what it closes on makes it.
     fn stands(&self, primitive: &Primitive<R, N>) -> bool {
+        let limit = if self.grasps { R::constant(1.0 / LEADING) } else { R::constant(1.0 / STANDING) };
         let velocity = Vector3::from(self.rollout.scaled_velocities()[0])
-            * (primitive.movement().rate() * self.rollout.speed() * R::constant(1.0 / STANDING));
+            * (primitive.movement().rate() * self.rollout.speed() * limit);
         velocity.dot(&velocity) < R::constant(1.0)
     }
 

@@ -25,6 +25,8 @@ pub(crate) struct Hand {
     pub(crate) unfelt: bool,
     /// Turns the sign of the gauges over.
     pub(crate) reversed_gauges: bool,
+    /// Friction of the drives, as a multiple of the model's.
+    pub(crate) friction: f64,
     /// Digits whose replies are lost.
     pub(crate) silent: bool,
     /// Torque that arrives at the digits (N m).
@@ -42,6 +44,7 @@ impl Hand {
             unloaded: 1990.0,
             unfelt: false,
             reversed_gauges: false,
+            friction: 1.0,
             silent: false,
             torque: [0.0; 4],
             frames: 0,
@@ -90,7 +93,8 @@ impl Hand {
     /// One control period of physics.
     pub(crate) fn advance(&mut self) {
         let dt = PERIOD / SUBSTEPS as f64;
-        let (inertia, viscous, coulomb) = ([4e-4, 2.2e-3, 2.2e-3, 2.2e-3], [0.1, 0.49, 0.49, 0.49], 0.1);
+        let inertia = [4e-4, 2.2e-3, 2.2e-3, 2.2e-3];
+        let (viscous, coulomb) = ([0.1, 0.49, 0.49, 0.49].map(|viscous| viscous * self.friction), 0.1 * self.friction);
         for _ in 0..SUBSTEPS {
             for digit in 0..4 {
                 let load = if digit == 0 { 0.0 } else { self.pressing(digit - 1) };

@@ -288,20 +288,26 @@ fn g1_a_shove_of_up_to_10_n_s_in_teach_hold_and_run_is_braked_with_torque_and_se
     }
 }
 
+/// The damping of such a run acts on a velocity that the model predicts, and no model knows of a shove. A spring that
+/// was drawn threw the hand back: of 201 shoves 3 left it faster than 0.25 m/s (0.29), and 8 where the pose that is fed
+/// back is the planned one (0.50). Those beyond the first sixty are named.
+///
+/// The change that makes it fail: a drawn spring is not let go of.
 #[test]
 fn g1_a_shove_in_a_compliant_run_gets_no_more_energy_than_it_brought() {
-    // Its damping acts on a velocity that the model predicts, and no model knows of a shove.
-    let options = RunOptions { compliant: true, pose_feedback: PoseFeedback::Planned, ..RunOptions::default() };
-    for index in 0..60 {
-        let force = 10.0 + 70.0 * fraction(index, 0.618_034);
-        let seconds = (0.05 + 0.45 * fraction(index, 0.754_878)).min(10.0 / force);
-        let direction = [0.569_84, 0.802_95, 0.324_72].map(|step| fraction(index, step) - 0.5);
-        let mut rig = in_state(State::Run, 1.5 * fraction(index, 0.430_16), options);
-        let outcome = shove(&mut rig, direction, force, seconds);
-        let what = format!("{index}: {force:.0} N for {seconds:.2} s along {direction:.2?}: {outcome:?}");
-        assert!(outcome.energy <= outcome.work.max(0.0) + 0.5 && outcome.braked < 0.75, "{what}");
-        if outcome.state == State::SoftStop {
-            recovers(&mut rig);
+    for pose_feedback in [PoseFeedback::Measured, PoseFeedback::Planned] {
+        let options = RunOptions { compliant: true, pose_feedback, ..RunOptions::default() };
+        for index in (0..60).chain([85, 101, 114, 122, 135, 145]) {
+            let force = 10.0 + 70.0 * fraction(index, 0.618_034);
+            let seconds = (0.05 + 0.45 * fraction(index, 0.754_878)).min(10.0 / force);
+            let direction = [0.569_84, 0.802_95, 0.324_72].map(|step| fraction(index, step) - 0.5);
+            let mut rig = in_state(State::Run, 1.5 * fraction(index, 0.430_16), options);
+            let outcome = shove(&mut rig, direction, force, seconds);
+            let what = format!("{index}: {force:.0} N for {seconds:.2} s along {direction:.2?}: {outcome:?}");
+            assert!(outcome.energy <= outcome.work.max(0.0) + 0.5 && outcome.braked < BRAKED, "{what}");
+            if outcome.state == State::SoftStop {
+                recovers(&mut rig);
+            }
         }
     }
 }
