@@ -205,7 +205,7 @@ fn g1_an_arm_that_was_led_aside_is_not_thrown_back_by_the_run_that_follows() {
 
 /// Speeds of the hand (m/s) as somebody lets go who leans on a joint of an arm that holds with this torque (N m),
 /// unseen by the sensor, so many seconds after a compliant run begins; then the fastest, and 0.3 s later.
-fn leaned_on(from: [f64; 7], (joint, torque): (usize, f64), seconds: f64) -> [f64; 3] {
+fn leaned_on(from: [f64; 7], (joint, torque): (usize, f64), seconds: f64) -> (Rig<f32>, [f64; 3]) {
     let mut rig = Rig::<f32>::new(from, 1);
     rig.command(Command::Hold);
     rig.run_for(2.0);
@@ -223,11 +223,12 @@ fn leaned_on(from: [f64; 7], (joint, torque): (usize, f64), seconds: f64) -> [f6
     rig.run_for(seconds);
     rig.plant.unseen.fill(0.0);
     let speeds = [hand_speed(&rig); 3];
-    (0..periods(1.0)).fold(speeds, |[pushed, fastest, late], cycle| {
+    let speeds = (0..periods(1.0)).fold(speeds, |[pushed, fastest, late], cycle| {
         rig.tick(None);
         let speed = hand_speed(&rig);
         [pushed, fastest.max(speed), if cycle == periods(0.3) { speed } else { late }]
-    })
+    });
+    (rig, speeds)
 }
 
 /// The change that makes it fail: a run takes over the torque of a spring that is drawn, and keeps it.
@@ -240,13 +241,33 @@ fn g1_an_arm_that_is_leaned_on_as_a_compliant_run_begins_is_not_thrown_back() {
         {
             for sign in [1.0, -1.0] {
                 let (joint, torque) = (torque.0, torque.1 * sign);
-                let [pushed, fastest, late] = leaned_on(from, (joint, torque), seconds);
+                let [pushed, fastest, late] = leaned_on(from, (joint, torque), seconds).1;
                 let what =
                     format!("J{}, {torque} N m for {seconds} s: {pushed:.2}, {fastest:.2}, {late:.2} m/s", joint + 1);
                 println!("{what}");
                 assert!(fastest < f64::max(0.35, pushed + 0.1) && late < BRAKED, "{what}");
             }
         }
+    }
+}
+
+/// The most that J4 of the outstretched arm holds, let go of after 50 ms, throws its forearm, and the arm stops
+/// (`JointSpeed`), 0.5 and 0.6 m/s. The change that makes it fail: a soft stop without damping.
+#[test]
+fn g1_an_outstretched_arm_that_its_elbow_was_leaned_on_is_used_again_after_its_stop() {
+    for torque in [11.0, -11.0] {
+        let (mut rig, speeds) = leaned_on(OUT, (3, torque), 0.05);
+        let what = format!("{torque} N m: {speeds:.2?} m/s, {:?}, {:?}", rig.cycle.state(), rig.cycle.fault());
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::SoftStop, Fault::JointSpeed), "{what}");
+        assert!(speeds[1] < 0.7 && speeds[2] < BRAKED && hand_speed(&rig) < 0.05, "{what}, {} m/s", hand_speed(&rig));
+        recovers(&mut rig);
+        rig.command(Command::Hold);
+        rig.command(Command::Approach { q: START.map(|q| q as f32), duration: 6.0 });
+        rig.until(State::Hold, 10.0);
+        rig.load(&primitive(&Design::default())).expect("loads");
+        rig.command(Command::Run(RunOptions { compliant: true, ..RunOptions::default() }));
+        rig.until(State::Hold, 10.0);
+        assert_eq!(rig.cycle.fault(), Fault::None, "{what}");
     }
 }
 
