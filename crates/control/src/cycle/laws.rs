@@ -251,9 +251,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             deviation.map(|deviation| deviation.expected_gauges),
         );
         let task = TaskReference::from_plan(&plan);
-        let lets_go = drift.is_free() || !(options.feedback || options.force_control);
-        let how = (options.pose_feedback, options.acceleration, lets_go);
-        let reference = operational.step(&self.model, tracking, measured.frames, measured.state, &task, how);
+        let how = (options.pose_feedback, options.acceleration);
+        let mut reference = operational.step(&self.model, tracking, measured.frames, measured.state, &task, how);
+        if drift.is_free() || !(options.feedback || options.force_control) {
+            operational.let_go(&mut reference, measured.state, &tracking.clamp);
+        }
         if run.goal_moves() {
             // A goal that the joints cannot follow is not led away from the tool.
             let behind = lag.distance * R::constant(1.0 / TRACKING_LIMIT);

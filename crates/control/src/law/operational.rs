@@ -42,6 +42,8 @@ pub struct OperationalController<R: Real> {
     clamped: bool,
     /// Joints whose springs something has drawn, one bit each, J1 lowest.
     drawn: u8,
+    /// The joint whose turn it is to be looked at.
+    turn: u8,
     lag: R,
 }
 
@@ -54,6 +56,7 @@ impl<R: Real> OperationalController<R> {
             derivative: LowPass::new(Butterworth::new(ACCELERATION_CUT_OFF, RATE)),
             clamped: false,
             drawn: 0,
+            turn: 0,
             lag: R::constant(0.0),
         }
     }
@@ -78,7 +81,7 @@ impl<R: Real> OperationalController<R> {
         self.lag
     }
 
-    /// One tick. `frames` are those of the measured posture; with the last of the options a drawn spring is let go of.
+    /// One tick. `frames` are those of the measured posture.
     pub fn step(
         &mut self,
         model: &ArmModel<R>,
@@ -86,7 +89,7 @@ impl<R: Real> OperationalController<R> {
         frames: &Frames<R>,
         state: &JointState<R>,
         task: &TaskReference<R>,
-        (feedback, acceleration, lets_go): (PoseFeedback, AccelerationSource, bool),
+        (feedback, acceleration): (PoseFeedback, AccelerationSource),
     ) -> JointReference<R> {
         let planned;
         let (frames, dq) = match feedback {
@@ -143,9 +146,6 @@ impl<R: Real> OperationalController<R> {
             self.clamped |= kept != *desired;
             *desired = kept;
         }
-        if lets_go {
-            self.let_go(&mut q_d, state, &planned, &gains.clamp);
-        }
         // Feedback beyond a soft limit is not wanted of this joint: the arm gives way as far as it can, and does not
         // stop.
         let limits = model.soft_min.iter().zip(&model.soft_max);
@@ -160,23 +160,40 @@ impl<R: Real> OperationalController<R> {
         JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d), planned: JointVelocities(planned) }
     }
 
-    /// Lets go of the springs, between the joints and `q_d` (rad), that something has drawn and whose joints come back
-    /// faster than `planned` (rad/s).
+    /// Lets go of the springs, between the joints and the `reference` of this tick, that something has drawn and whose
+    /// joints come back faster than planned. One joint in a control period is looked at: nobody draws a spring faster.
+    ///
+    /// Not inlined: where something is felt it costs nothing.
     #[inline(never)]
-    fn let_go(&mut self, q_d: &mut Vector7<R>, state: &JointState<R>, planned: &Vector7<R>, clamp: &Vector7<R>) {
-        let (mut drawn, mut bit) = (0, 1);
-        let joints = q_d.iter_mut().zip(state.q.0.iter()).zip(state.dq.0.iter().zip(planned.iter()));
-        for ((((desired, q), (dq, planned)), clamp), let_go) in joints.zip(clamp.iter()).zip(LET_GO) {
-            let offset = *desired - *q;
-            let far = R::constant(if self.drawn & bit == 0 { DRAWN } else { RELAXED });
-            if offset > far || offset < -far {
-                drawn |= bit;
-                let reach = spring::reach(offset, *dq - *planned, *clamp, let_go);
+    pub fn let_go(&mut self, reference: &mut JointReference<R>, state: &JointState<R>, clamp: &Vector7<R>) {
+        let joint = usize::from(self.turn) % JOINTS;
+        self.turn = joint as u8 + 1;
+        let (offset, far) = (reference.q.0[joint] - state.q.0[joint], R::constant(DRAWN));
+        if offset > far || offset < -far {
+            self.drawn |= 1 << joint;
+        }
+        if self.drawn != 0 {
+            self.release(reference, state, clamp);
+        }
+    }
+
+    /// The same for every spring that is drawn.
+    #[inline(never)]
+    fn release(&mut self, reference: &mut JointReference<R>, state: &JointState<R>, clamp: &Vector7<R>) {
+        let speeds = state.dq.0 - reference.planned.0;
+        let joints = reference.q.0.iter_mut().zip(state.q.0.iter()).zip(speeds.iter());
+        let mut bit = 1;
+        for ((((desired, q), speed), clamp), let_go) in joints.zip(clamp.iter()).zip(LET_GO) {
+            let (offset, near) = (*desired - *q, R::constant(RELAXED));
+            if offset < near && offset > -near {
+                self.drawn &= !bit;
+            } else if self.drawn & bit != 0 {
+                let reach = spring::reach(offset, *speed, *clamp, let_go);
                 *desired = at_most(at_least(*desired, *q - reach), *q + reach);
             }
             bit <<= 1;
         }
-        self.drawn = drawn;
+        self.q_d = reference.q;
     }
 }
 
@@ -210,7 +227,7 @@ mod tests {
         let (frames, gains) = (Frames::new(&model, &held), Gains::tuned().compliant);
         let mut controller = OperationalController::new(posture);
         for _ in 0..3000 {
-            controller.step(&model, &gains, &frames, &state, &task, (feedback, AccelerationSource::Analytic, true));
+            controller.step(&model, &gains, &frames, &state, &task, (feedback, AccelerationSource::Analytic));
         }
         (controller.q_d().0 - posture.0).amax()
     }
