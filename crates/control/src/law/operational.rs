@@ -163,7 +163,7 @@ impl<R: Real> OperationalController<R> {
     /// Lets go of the springs, between the joints and the `reference` of this tick, that something has drawn and whose
     /// joints come back faster than planned. One joint in a control period is looked at: nobody draws a spring faster.
     ///
-    /// Not inlined: where something is felt it costs nothing.
+    /// Not inlined: where the sensor touches something it costs nothing.
     #[inline(never)]
     pub fn let_go(&mut self, reference: &mut JointReference<R>, state: &JointState<R>, clamp: &Vector7<R>) {
         let joint = usize::from(self.turn) % JOINTS;
