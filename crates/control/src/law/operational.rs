@@ -71,11 +71,6 @@ impl<R: Real> OperationalController<R> {
         self.clamped
     }
 
-    /// True if something has drawn a spring that is let go of.
-    pub fn is_drawn(&self) -> bool {
-        self.drawn != 0
-    }
-
     /// Speed of the tool against that of the plan in the last tick (m/s).
     pub fn lag(&self) -> R {
         self.lag
@@ -161,20 +156,23 @@ impl<R: Real> OperationalController<R> {
     }
 
     /// Lets go of the springs, between the joints and the `reference` of this tick, that something has drawn and whose
-    /// joints come back faster than planned. One joint in a control period is looked at: nobody draws a spring faster.
+    /// joints come back faster than planned; true if there is one that is drawn. One joint in a control period is looked
+    /// at: nobody draws a spring faster.
     ///
     /// Not inlined: where the sensor touches something it costs nothing.
     #[inline(never)]
-    pub fn let_go(&mut self, reference: &mut JointReference<R>, state: &JointState<R>, clamp: &Vector7<R>) {
+    pub fn let_go(&mut self, reference: &mut JointReference<R>, state: &JointState<R>, clamp: &Vector7<R>) -> bool {
         let joint = usize::from(self.turn) % JOINTS;
         self.turn = joint as u8 + 1;
         let (offset, far) = (reference.q.0[joint] - state.q.0[joint], R::constant(DRAWN));
         if offset > far || offset < -far {
             self.drawn |= 1 << joint;
         }
-        if self.drawn != 0 {
+        let drawn = self.drawn != 0;
+        if drawn {
             self.release(reference, state, clamp);
         }
+        drawn
     }
 
     /// The same for every spring that is drawn.
