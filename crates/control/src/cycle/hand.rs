@@ -148,8 +148,12 @@ impl<R: Real> HandDrive<R> {
     #[inline(never)]
     pub fn grasp(&self) -> Grasp {
         let (Aim::Follow(reference), Some(state)) = (&self.aim, &self.state) else { return Grasp::Open };
-        let behind = reference.q.iter().zip(&state.q).skip(1).map(|(wanted, found)| *wanted - *found);
-        if behind.filter(|behind| *behind > R::constant(HELD_UP)).count() > 1 && held_up(reference, state) > 1 {
+        let fingers = reference.q.iter().zip(&state.q).zip(reference.dq.iter().zip(&state.dq)).skip(1);
+        let held_up = fingers.filter(|((wanted, found), (plan, speed))| {
+            **wanted - **found > R::constant(HELD_UP)
+                && **speed < **plan * R::constant(STANDS.0) + R::constant(STANDS.1)
+        });
+        if held_up.count() > 1 {
             Grasp::Gripping
         } else if reference.dq.iter().skip(1).any(|speed| *speed > R::constant(CLOSING)) {
             Grasp::Closing
@@ -220,15 +224,4 @@ impl<R: Real> HandDrive<R> {
             self.driven = false;
         }
     }
-}
-
-/// Returns how many fingers stand, behind their plan on the closing side. Not inlined: few cycles ask for it.
-#[inline(never)]
-fn held_up<R: Real>(reference: &HandReference<R>, state: &HandState<R>) -> usize {
-    let found = state.q.iter().zip(&state.dq);
-    let fingers = reference.q.iter().zip(&reference.dq).zip(found).skip(1);
-    let stands = fingers.filter(|((wanted, plan), (found, speed))| {
-        **wanted - **found > R::constant(HELD_UP) && **speed < **plan * R::constant(STANDS.0) + R::constant(STANDS.1)
-    });
-    stands.count()
 }

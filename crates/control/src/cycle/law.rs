@@ -159,7 +159,9 @@ impl<R: Real> Posture<R> {
         let back = (self.q.0 - self.held.0).map(|way| within(way, step));
         let mut offset = (self.held.0 + back - q.0).zip_map(clamp, within);
         for (((offset, speed), clamp), let_go) in offset.iter_mut().zip(dq.0.iter()).zip(clamp.iter()).zip(LET_GO) {
-            *offset = within(*offset, reach(*offset, *speed, *clamp, let_go));
+            if let Some(reach) = reach(*offset, *speed, *clamp, let_go) {
+                *offset = within(*offset, reach);
+            }
         }
         let held = q.0 + offset;
         // Exactly, where nobody pushes: a sum of differences is not.

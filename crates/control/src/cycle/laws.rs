@@ -252,9 +252,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         );
         let task = TaskReference::from_plan(&plan);
         let how = (options.pose_feedback, options.acceleration);
-        let mut reference = operational.step(&self.model, tracking, measured.frames, measured.state, &task, how);
-        let lets_go = drift.is_free() || !(options.feedback || options.force_control);
-        let drawn = lets_go && operational.let_go(&mut reference, measured.state, &tracking.clamp);
+        let reference = operational.step(&self.model, tracking, measured.frames, measured.state, &task, how);
         if run.goal_moves() {
             // A goal that the joints cannot follow is not led away from the tool.
             let behind = lag.distance * R::constant(1.0 / TRACKING_LIMIT);
@@ -287,6 +285,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         set |= if run.is_faded(primitive) { flags::FEEDBACK_FADED } else { 0 };
         set |= if operational.is_clamped() { flags::CLAMPED } else { 0 };
         let free = senses == Senses::Fresh && drift.is_free() && !self.cut.is_cut();
+        let lets_go = drift.is_free() || !(options.feedback || options.force_control);
+        let drawn = lets_go && operational.let_go(measured.state, &reference.planned, &tracking.clamp);
         if options.compliant {
             if grasp == Grasp::Gripping || drawn {
                 settling.fade();

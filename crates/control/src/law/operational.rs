@@ -155,43 +155,40 @@ impl<R: Real> OperationalController<R> {
         JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d), planned: JointVelocities(planned) }
     }
 
-    /// Lets go of the springs, between the joints and the `reference` of this tick, that something has drawn and whose
-    /// joints come back faster than planned; true if there is one that is drawn. One joint in a control period is looked
-    /// at: nobody draws a spring faster.
-    ///
-    /// Not inlined: where the sensor touches something it costs nothing.
+    /// Lets go, from the next tick on, of the springs between joints and `q_d` that something has drawn and whose
+    /// joints come back faster than `planned`; true if there is one that is drawn. One joint in a tick is looked at:
+    /// nobody draws a spring faster.
     #[inline(never)]
-    pub fn let_go(&mut self, reference: &mut JointReference<R>, state: &JointState<R>, clamp: &Vector7<R>) -> bool {
+    pub fn let_go(&mut self, state: &JointState<R>, planned: &JointVelocities<R>, clamp: &Vector7<R>) -> bool {
         let joint = usize::from(self.turn) % JOINTS;
         self.turn = joint as u8 + 1;
-        let (offset, far) = (reference.q.0[joint] - state.q.0[joint], R::constant(DRAWN));
-        if offset > far || offset < -far {
+        let offset = self.q_d.0[joint] - state.q.0[joint];
+        if offset * offset > R::constant(DRAWN * DRAWN) {
             self.drawn |= 1 << joint;
         }
         let drawn = self.drawn != 0;
         if drawn {
-            self.release(reference, state, clamp);
+            self.release(state, &(state.dq.0 - planned.0), clamp);
         }
         drawn
     }
 
-    /// The same for every spring that is drawn.
+    /// The same for every spring that is drawn; `speeds` are those beyond the plan.
     #[inline(never)]
-    fn release(&mut self, reference: &mut JointReference<R>, state: &JointState<R>, clamp: &Vector7<R>) {
-        let speeds = state.dq.0 - reference.planned.0;
-        let joints = reference.q.0.iter_mut().zip(state.q.0.iter()).zip(speeds.iter());
+    fn release(&mut self, state: &JointState<R>, speeds: &Vector7<R>, clamp: &Vector7<R>) {
+        let joints = self.q_d.0.iter_mut().zip(state.q.0.iter()).zip(speeds.iter());
         let mut bit = 1;
         for ((((desired, q), speed), clamp), let_go) in joints.zip(clamp.iter()).zip(LET_GO) {
             let (offset, near) = (*desired - *q, R::constant(RELAXED));
             if offset < near && offset > -near {
                 self.drawn &= !bit;
             } else if self.drawn & bit != 0 {
-                let reach = spring::reach(offset, *speed, *clamp, let_go);
-                *desired = at_most(at_least(*desired, *q - reach), *q + reach);
+                if let Some(reach) = spring::reach(offset, *speed, *clamp, let_go) {
+                    *desired = at_most(at_least(*desired, *q - reach), *q + reach);
+                }
             }
             bit <<= 1;
         }
-        self.q_d = reference.q;
     }
 }
 

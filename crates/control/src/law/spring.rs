@@ -10,15 +10,13 @@ pub(crate) const LET_GO: [(f64, f64); JOINTS] = {
     [arm, arm, arm, arm, wrist, wrist, wrist]
 };
 
-/// Returns how far a spring may be drawn (rad) whose end is `drawn` away from its joint: `clamp`, and less the faster
-/// the joint returns to it. `speed` is that of the joint beyond its plan, `let_go` the entry of [`LET_GO`] (rad/s).
-pub(crate) fn reach<R: Real>(drawn: R, speed: R, clamp: R, let_go: (f64, f64)) -> R {
+/// Returns how far a spring may be drawn (rad) whose end is `drawn` away from its joint: less than `clamp` the faster
+/// the joint returns to it, `None` where it need not be let go of. `speed` is that of the joint beyond its plan,
+/// `let_go` the entry of [`LET_GO`] (rad/s).
+pub(crate) fn reach<R: Real>(drawn: R, speed: R, clamp: R, let_go: (f64, f64)) -> Option<R> {
     let (slow, fast) = let_go;
     let zero = R::constant(0.0);
     let back = if drawn < zero { -speed } else { speed };
-    if back > R::constant(slow) {
-        clamp * at_least((R::constant(fast) - back) * R::constant(1.0 / (fast - slow)), zero)
-    } else {
-        clamp
-    }
+    let share = |back: R| at_least((R::constant(fast) - back) * R::constant(1.0 / (fast - slow)), zero);
+    (back > R::constant(slow)).then(|| share(back) * clamp)
 }

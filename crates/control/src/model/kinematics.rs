@@ -213,9 +213,10 @@ impl<R: Real> Frames<R> {
     pub fn joint_torques(&self, wrench: &Vector6<R>) -> JointTorques<R> {
         let [fx, fy, fz, nx, ny, nz] = wrench.data.0[0];
         let (force, moment) = (Vector3::new(fx, fy, fz), Vector3::new(nx, ny, nz));
+        let at_base = moment + self.tool.cross(&force);
         let mut torques = Vector7::zeros();
         for ((torque, axis), origin) in torques.iter_mut().zip(&self.axes).zip(&self.origins) {
-            *torque = axis.dot(&(moment + (self.tool - origin).cross(&force)));
+            *torque = axis.dot(&(at_base - origin.cross(&force)));
         }
         JointTorques(torques)
     }
