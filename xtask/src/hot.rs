@@ -77,6 +77,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "as a compliant run begins under a load: seven joints, a few instructions each",
     ),
     ("control::cycle::law::Posture<R>::effort", "the arm stands: no plan and no feedback is computed"),
+    (
+        "control::law::operational::OperationalController<R>::release",
+        "the memory is full; something has drawn a spring: seven joints, a few dozen instructions each",
+    ),
     ("control::law::joint::JointController<R>::keep", "a reply is missing: a few dozen instructions"),
     ("control::sense::swing", "the memory is full; seven joints, a few dozen instructions each"),
     ("control::sense::observer", "the memory is full; a few loops that the cache keeps from one cycle to the next"),

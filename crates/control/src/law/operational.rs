@@ -182,10 +182,10 @@ impl<R: Real> OperationalController<R> {
             let (offset, near) = (*desired - *q, R::constant(RELAXED));
             if offset < near && offset > -near {
                 self.drawn &= !bit;
-            } else if self.drawn & bit != 0 {
-                if let Some(reach) = spring::reach(offset, *speed, *clamp, let_go) {
-                    *desired = at_most(at_least(*desired, *q - reach), *q + reach);
-                }
+            } else if self.drawn & bit != 0
+                && let Some(reach) = spring::reach(offset, *speed, *clamp, let_go)
+            {
+                *desired = at_most(at_least(*desired, *q - reach), *q + reach);
             }
             bit <<= 1;
         }
