@@ -285,7 +285,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         set |= if run.is_faded(primitive) { flags::FEEDBACK_FADED } else { 0 };
         set |= if operational.is_clamped() { flags::CLAMPED } else { 0 };
         let free = senses == Senses::Fresh && drift.is_free() && !self.cut.is_cut();
-        let lets_go = drift.is_free() || !(options.feedback || options.force_control);
+        // The sensor measures a throw, too: inertia of the hand. So what is drawn is let go of until it is relaxed.
+        let lets_go = operational.is_drawn() || drift.is_free() || !(options.feedback || options.force_control);
         let drawn = lets_go && operational.let_go(measured.state, &reference.planned, &tracking.clamp);
         if options.compliant {
             if grasp == Grasp::Gripping || drawn {

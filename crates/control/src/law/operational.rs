@@ -71,6 +71,11 @@ impl<R: Real> OperationalController<R> {
         self.clamped
     }
 
+    /// True while a spring that something has drawn is let go of.
+    pub fn is_drawn(&self) -> bool {
+        self.drawn != 0
+    }
+
     /// Speed of the tool against that of the plan in the last tick (m/s).
     pub fn lag(&self) -> R {
         self.lag
