@@ -221,41 +221,6 @@ fn h12_two_simulated_devices_do_not_share_a_flash_and_a_served_arm_takes_no_file
     tactus(at, "--device sil:world=simple,flash=flash.bin list").success();
 }
 
-#[cfg(feature = "mujoco")]
-#[test]
-fn figures_only_draws_results_that_are_there_and_teaches_nothing() {
-    let folder = learned(3.0, "");
-    let empty = tactus(folder.path(), "experiment flashlight --figures-only --out none").failure().code(2);
-    assert!(stderr(&empty).contains("error[E242]"), "{}", stderr(&empty));
-    let empty = tactus(folder.path(), "experiment flashlight --figures-only --out none --primitive reach.toml");
-    assert!(stderr(&empty.failure().code(2)).contains("there are no results in none"));
-    assert!(!folder.path().join("none").join("results.jsonl").exists());
-}
-
-#[cfg(feature = "mujoco")]
-#[test]
-fn an_object_that_is_none_is_refused_before_anything_is_taught_or_written() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    std::fs::write(
-        at("heavy.toml"),
-        include_str!("../../crates/sim/objects/cup.toml").replacen("mass = 0.2", "mass = -0.2", 1),
-    )
-    .unwrap();
-    std::fs::write(at("cup.toml"), include_str!("../../crates/sim/objects/cup.toml")).unwrap();
-    for (object, code, exit, reason) in [
-        ("teapot", "E271", 2, "there is no object 'teapot'; there are small-torch, flashlight"),
-        ("none.toml", "E233", 2, "No such file"),
-        ("heavy.toml", "E663", 6, "is -0.2; it must be from"),
-        ("cup.toml", "E663", 6, "the name 'cup' is that of an object which is compiled in"),
-    ] {
-        let failed = tactus(folder.path(), &format!("experiment cup --object {object} --out results"));
-        let failed = stderr(&failed.failure().code(exit));
-        assert!(failed.contains(&format!("error[{code}]")) && failed.contains(reason), "{failed}");
-        assert!(!at("results").exists(), "{object}");
-    }
-}
-
 #[test]
 fn a_demonstration_that_nobody_ends_is_no_success_and_what_was_recorded_is_kept() {
     let folder = tempfile::tempdir().unwrap();

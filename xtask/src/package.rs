@@ -37,6 +37,8 @@ pub(crate) fn run() -> Result<()> {
             let mut cargo = shell::cargo();
             // In the folder that is removed: a build that is kept names its sources where they were unpacked last time.
             cargo.current_dir(&package).env("CARGO_TARGET_DIR", folder.join("target"));
+            // As in the workspace: without it the tests of the arithmetic take minutes.
+            cargo.env("CARGO_PROFILE_DEV_OPT_LEVEL", "1").env("CARGO_PROFILE_DEV_DEBUG", "line-tables-only");
             cargo
         };
         shell::run(there().args(["test", "--quiet", "--all-features"]))?;

@@ -1,9 +1,33 @@
-//! Every file of tests beside a `main.rs` in a folder `tests` is a module of it: cargo finds no file there by itself.
+//! No file of tests is left out: one beside a `main.rs` in a folder `tests` is a module of it, because cargo finds none
+//! there by itself; and one that needs the world is in a program that is run with it.
 
 use super::Finding;
+use crate::test::WITH_THE_WORLD;
+
+/// Checks every file of tests.
+pub(super) fn check(files: &[(String, String)]) -> Vec<Finding> {
+    let mut found = modules(files);
+    found.extend(world(files));
+    found
+}
+
+/// Tests with the world, in a program that nothing runs with it.
+fn world(files: &[(String, String)]) -> impl Iterator<Item = Finding> {
+    let asks = concat!("cfg(feature = ", "\"mujoco\")");
+    let tests = files.iter().filter(|(path, _)| path.contains("tests/") && path.ends_with(".rs"));
+    let left_out = tests.filter(move |(path, text)| {
+        text.contains(asks) && !WITH_THE_WORLD.iter().any(|(_, folder)| path.starts_with(folder))
+    });
+    left_out.map(|(path, _)| {
+        Finding::new(
+            path,
+            "never run with the world: its place is in tests/tests/system, or name it in xtask/src/test.rs",
+        )
+    })
+}
 
 /// Checks every folder `tests` whose files are one program.
-pub(super) fn check(files: &[(String, String)]) -> Vec<Finding> {
+fn modules(files: &[(String, String)]) -> Vec<Finding> {
     let programs = files.iter().filter_map(|(path, text)| Some((path.strip_suffix("tests/main.rs")?, text)));
     let left_out = |(package, text): (&str, &str)| {
         let modules = text.lines().filter_map(|line| line.strip_prefix("mod ")?.strip_suffix(';')).collect::<Vec<_>>();

@@ -134,6 +134,16 @@ fn a_file_of_tests_that_no_program_has_is_found() {
 }
 
 #[test]
+fn a_test_that_needs_the_world_in_a_program_without_it_is_found() {
+    let check = |path: &str, text: &str| lines(programs::check(&files(&[(path, text)])));
+    let asks = "#[cfg(feature = \"mujoco\")]\nmod b;\n";
+    assert_eq!(check("host/tests/b.rs", asks).len(), 1);
+    assert_eq!(check("crates/sim/tests/b.rs", asks), [""; 0]);
+    assert_eq!(check("host/tests/b.rs", "mod b;\n"), [""; 0]);
+    assert_eq!(check("host/src/b.rs", asks), [""; 0], "what is no test is compiled with the rest");
+}
+
+#[test]
 fn arrows_of_manifests_and_table_are_compared_both_ways() {
     let table = |second: &str| {
         let text = format!("| crate | depends on |\n|---|---|\n| `a` | |\n| `b` | {second} |\n\n| `c` | `a` |\n");
