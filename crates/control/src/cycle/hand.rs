@@ -49,7 +49,6 @@ pub struct HandDrive<R: Real> {
     expected: Option<[R; FINGERS]>,
     /// True if a finger torque was cut to its limit in the last tick.
     saturated: bool,
-    /// True if the last tick drove it: it was heard then.
     driven: bool,
     /// Its relation to what is between its fingers when it was last heard in this run.
     grasp: Grasp,
@@ -154,7 +153,7 @@ impl<R: Real> HandDrive<R> {
     pub fn grasp(&mut self) -> Grasp {
         let Aim::Follow(reference) = &self.aim else { return Grasp::Open };
         // Its worms hold what they held: the plan that goes on without it tells nothing about its fingers.
-        let (true, Some(state)) = (self.driven, &self.state) else { return self.grasp };
+        let Some(state) = self.state.as_ref().filter(|state| !state.is_lost()) else { return self.grasp };
         let fingers = reference.q.iter().zip(&state.q).zip(reference.dq.iter().zip(&state.dq)).skip(1);
         let held_up = fingers.filter(|((wanted, found), (plan, speed))| {
             **wanted - **found > R::constant(HELD_UP)
