@@ -50,8 +50,6 @@ pub struct HandDrive<R: Real> {
     /// True if a finger torque was cut to its limit in the last tick.
     saturated: bool,
     driven: bool,
-    /// Its relation to what is between its fingers when it was last heard in this run.
-    grasp: Grasp,
 }
 
 impl<R: Real> HandDrive<R> {
@@ -67,7 +65,6 @@ impl<R: Real> HandDrive<R> {
             expected: None,
             saturated: false,
             driven: false,
-            grasp: Grasp::Open,
         })
     }
 
@@ -129,7 +126,6 @@ impl<R: Real> HandDrive<R> {
     /// Begins to follow a run.
     pub fn begin_run(&mut self) {
         self.expected = None;
-        self.grasp = Grasp::Open;
         self.controller.reset();
     }
 
@@ -150,23 +146,20 @@ impl<R: Real> HandDrive<R> {
     /// Returns what the hand does with what is between its fingers. Not inlined: the small fast memory of a board is
     /// full.
     #[inline(never)]
-    pub fn grasp(&mut self) -> Grasp {
-        let Aim::Follow(reference) = &self.aim else { return Grasp::Open };
-        // Its worms hold what they held: the plan that goes on without it tells nothing about its fingers.
-        let Some(state) = self.state.as_ref().filter(|state| !state.is_lost()) else { return self.grasp };
+    pub fn grasp(&self) -> Grasp {
+        let (Aim::Follow(reference), Some(state)) = (&self.aim, &self.state) else { return Grasp::Open };
         let fingers = reference.q.iter().zip(&state.q).zip(reference.dq.iter().zip(&state.dq)).skip(1);
         let held_up = fingers.filter(|((wanted, found), (plan, speed))| {
             **wanted - **found > R::constant(HELD_UP)
                 && **speed < **plan * R::constant(STANDS.0) + R::constant(STANDS.1)
         });
-        self.grasp = if held_up.count() > 1 {
+        if held_up.count() > 1 {
             Grasp::Gripping
         } else if reference.dq.iter().skip(1).any(|speed| *speed > R::constant(CLOSING)) {
             Grasp::Closing
         } else {
             Grasp::Open
-        };
-        self.grasp
+        }
     }
 
     /// Keeps the last reference, at rest: what is gripped stays gripped.
