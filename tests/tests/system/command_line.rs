@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::Value;
-use system_tests::command::{one_object, stderr, tactus};
+use system_tests::command::{one_object, tactus};
 use system_tests::{PRIMITIVE, expect, taught};
 
 /// Fast, and without the MuJoCo world.
@@ -75,37 +75,5 @@ fn failures_are_one_json_object_with_number_and_exit_code() {
         let object = one_object(&failed.get_output().stdout);
         assert!(object.to_string().contains("\"E"), "{arguments:?}: {object}");
         assert!(!failed.get_output().stderr.is_empty(), "{arguments:?} says nothing");
-    }
-}
-
-#[test]
-fn figures_only_draws_results_that_are_there_and_teaches_nothing() {
-    let folder = expect(tempfile::tempdir());
-    expect(taught().write(&folder.path().join("primitive.toml")));
-    let line = ["experiment", "flashlight", "--figures-only", "--out", "none"];
-    let empty = tactus(folder.path(), &line).failure().code(2);
-    assert!(stderr(&empty).contains("error[E242]"), "{}", stderr(&empty));
-    let empty = tactus(folder.path(), &[&line[..], &["--primitive", "primitive.toml"]].concat()).failure().code(2);
-    assert!(stderr(&empty).contains("there are no results in none"), "{}", stderr(&empty));
-    assert!(!folder.path().join("none").join("results.jsonl").exists());
-}
-
-#[test]
-fn an_object_that_is_none_is_refused_before_anything_is_taught_or_written() {
-    const CUP: &str = include_str!("../../../crates/sim/objects/cup.toml");
-    let folder = expect(tempfile::tempdir());
-    let folder = folder.path();
-    expect(std::fs::write(folder.join("heavy.toml"), CUP.replacen("mass = 0.2", "mass = -0.2", 1)));
-    expect(std::fs::write(folder.join("cup.toml"), CUP));
-    for (object, code, exit, reason) in [
-        ("teapot", "E271", 2, "there is no object 'teapot'; there are small-torch, flashlight"),
-        ("none.toml", "E233", 2, "No such file"),
-        ("heavy.toml", "E663", 6, "is -0.2; it must be from"),
-        ("cup.toml", "E663", 6, "the name 'cup' is that of an object which is compiled in"),
-    ] {
-        let failed = tactus(folder, &["experiment", "cup", "--object", object, "--out", "results"]);
-        let failed = stderr(&failed.failure().code(exit));
-        assert!(failed.contains(&format!("error[{code}]")) && failed.contains(reason), "{failed}");
-        assert!(!folder.join("results").exists(), "{object}");
     }
 }

@@ -8,6 +8,7 @@ mod calibration;
 mod command_line;
 mod cost;
 mod determinism;
+mod experiment;
 mod firmware_ends;
 mod flood;
 mod hand;
