@@ -125,7 +125,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 }
                 let hand = self.hand.answering();
                 let begun = (options, self.caution == Caution::Slowed);
-                Run::start(&mut self.run, primitive, q, &measured.pose, hand.as_ref(), begun)?;
+                Run::start(&mut self.run, primitive, q, &measured.pose, hand, begun)?;
                 self.supervisor.take(Trigger::Run, Fault::None)?;
                 self.wrench.tare_drift();
                 self.hand.tare_drift();

@@ -42,6 +42,8 @@ enum Aim<R: Real> {
 pub struct HandDrive<R: Real> {
     estimator: HandEstimator<R>,
     state: Option<HandState<R>>,
+    /// True if the state is that of a lost hand. Asked once in a cycle: the small fast memory of a board is full.
+    lost: bool,
     controller: HandController<R>,
     limiter: HandLimiter<R>,
     aim: Aim<R>,
@@ -59,6 +61,7 @@ impl<R: Real> HandDrive<R> {
         init!(HandDrive {
             estimator: HandEstimator::new(),
             state: None,
+            lost: false,
             controller <- controller,
             limiter: HandLimiter::new(),
             aim: Aim::None,
@@ -71,19 +74,20 @@ impl<R: Real> HandDrive<R> {
     /// Takes what the hand told since the last cycle.
     pub fn update(&mut self, sample: Option<&HandSample>) {
         self.state = self.estimator.update(sample);
+        self.lost = self.state.as_ref().is_some_and(HandState::is_lost);
         if self.state.is_none() {
             self.release();
         }
     }
 
     /// Returns the state of the hand; `None` without an initialised one.
-    pub fn state(&self) -> Option<HandState<R>> {
-        self.state
+    pub fn state(&self) -> Option<&HandState<R>> {
+        self.state.as_ref()
     }
 
     /// The state of a hand that answers.
-    pub fn answering(&self) -> Option<HandState<R>> {
-        self.state.filter(|state| !state.is_lost())
+    pub fn answering(&self) -> Option<&HandState<R>> {
+        self.state().filter(|_| !self.lost)
     }
 
     /// True while a move that a person asked for is under way.
@@ -129,8 +133,13 @@ impl<R: Real> HandDrive<R> {
         self.controller.reset();
     }
 
-    /// Follows the plan of a run, kept within the range of the digits; with `expected` gauges (N m) also in force.
+    /// Follows the plan of a run, kept within the range of the digits; with `expected` gauges (N m) also in force. A
+    /// lost hand follows no more until it is heard again: a plan that goes on without its fingers tells nothing about
+    /// them.
     pub fn follow(&mut self, reference: &HandReference<R>, expected: Option<[R; FINGERS]>) {
+        if self.lost {
+            return;
+        }
         let mut reference = *reference;
         for ((q, dq), [min, max]) in reference.q.iter_mut().zip(&mut reference.dq).zip(ranges()) {
             let kept = crate::real::at_least(crate::real::at_most(*q, R::constant(max)), R::constant(min));
@@ -193,15 +202,15 @@ impl<R: Real> HandDrive<R> {
                 (*settled <= SETTLING).then_some(reference)
             }
         };
-        let (Some(reference), Some(state)) = (reference, self.state) else {
+        let Some(reference) = reference else {
             self.release();
             return None;
         };
-        if state.is_lost() {
+        let (false, Some(state)) = (self.lost, &self.state) else {
             self.stop_driving();
             return None;
-        }
-        let wanted = self.controller.torque(gains, &state, &reference, self.expected.as_ref(), self.saturated);
+        };
+        let wanted = self.controller.torque(gains, state, &reference, self.expected.as_ref(), self.saturated);
         self.driven = true;
         let limited = self.limiter.limit(&wanted);
         self.saturated = wanted.iter().zip(TORQUE_LIMIT).skip(1).any(|(torque, limit)| {
@@ -216,6 +225,8 @@ impl<R: Real> HandDrive<R> {
         self.limiter.not_sent();
     }
 
+    /// Not inlined: the small fast memory of a board is full.
+    #[inline(never)]
     fn stop_driving(&mut self) {
         if self.driven {
             self.controller.reset();

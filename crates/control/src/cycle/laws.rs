@@ -13,7 +13,6 @@ use crate::plan::primitive::posture_and_hand;
 use crate::plan::reference::{HandReference, JointReference, TaskReference};
 use crate::plan::run::Senses;
 use crate::real::{Real, at_least, at_most, sqrt};
-use crate::sense::hand::HandState;
 use crate::sense::observer::Trust;
 use crate::time::{PERIOD, periods};
 use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6, Vector7, Wrench};
@@ -233,15 +232,15 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         let Running { operational, controller, handover, leaning, lag, drift, pressing, settling } = running;
         let (options, tracking) = (run.options, self.gains.tracking(run.options.compliant));
-        let hand = self.hand.answering().filter(HandState::feels);
-        let gauges = hand.as_ref().map(|hand| &hand.gauges);
+        let hand = self.hand.answering().filter(|hand| hand.feels());
+        let gauges = hand.map(|hand| &hand.gauges);
         let grasp = self.hand.grasp();
         let Ok(plan) = run.step(primitive, &measured.wrench, gauges, grasp, senses) else {
             return self.float(measured);
         };
         if senses == Senses::Fresh {
             self.wrench.follow(drift, &measured.wrench, run.deviation(), measured.frames);
-            if let Some(surprise) = run.watch(primitive, &measured.wrench, hand.as_ref()) {
+            if let Some(surprise) = run.watch(primitive, &measured.wrench, hand) {
                 self.pending = Some(Event::Surprised { phase: surprise.progress, channel: surprise.channel });
             }
         }
