@@ -26,27 +26,31 @@ fn checks() -> Result<()> {
     shell::run(shell::cargo().args(["fmt", "--all", "--check"]))?;
     docs::run()?;
     house::run(None)?;
-    let machine = setup::all()?;
-    let images = Lane::begin(&["ci", "images"])?;
+    setup::all()?;
+    let beside = Lane::begin(&["ci", "beside"])?;
     lint_host()?;
     build::documentation()?;
     plain_root()?;
     crate::faults(&[])?;
     crate::faults(&["storm", "--runs", "300"])?;
-    crate::faults(&["endurance"])?;
-    fuzz::run(fuzz::USUAL)?;
     package::run()?;
-    images.end()?;
+    beside.end()?;
     build::host()?;
     let board = Lane::begin(&["ci", "board"])?;
     test::with_the_world()?;
     test::firmware()?;
     crate::faults(&["--device", "sim:"])?;
     board.end()?;
-    budget::run(&machine)?;
-    hand::run(&machine)?;
     build::nothing_twice()?;
     build::panics()
+}
+
+/// The part that goes on beside the builds of the root: all for other processors, then all that is optimised, and at
+/// last a check that keeps one processor busy alone.
+pub(crate) fn beside() -> Result<()> {
+    images()?;
+    fuzz::run(fuzz::USUAL)?;
+    crate::faults(&["endurance"])
 }
 
 /// Lints and builds of the images and of the board's emulator, and the tests of that emulator: the part of the checks
@@ -62,9 +66,13 @@ pub(crate) fn images() -> Result<()> {
     emulated::test()
 }
 
-/// Trial of the image on the emulated board; the `tactus` command is there already.
+/// Trial of the image on the emulated board, and what the images cost; the `tactus` command is there already. Each of
+/// them keeps one processor busy.
 pub(crate) fn board() -> Result<()> {
-    emulated::run(None)
+    let machine = setup::all()?;
+    emulated::run(None)?;
+    budget::run(&machine)?;
+    hand::run(&machine)
 }
 
 fn lint_host() -> Result<()> {

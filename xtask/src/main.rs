@@ -48,7 +48,7 @@ cargo xtask <verb>
            --build: only make what `--device board:` needs; --image FILE: run that image
   demo     teach, learn, check, upload and run a movement on the simulated arm
   test     every test, whole-system tests under QEMU included
-  ci       what a change must pass: format, lints, builds, tests, budgets; a part of it alone: ci images, ci board
+  ci       what a change must pass: format, lints, builds, tests, budgets; a part of it alone: ci images, ci beside, ci board
   budget   instructions per control cycle, interrupt latency, stack, flash and RAM of the image
   stack    how deep the stack of every image that is there goes, function by function
            --image FILE: of one image
@@ -141,6 +141,7 @@ fn dispatch(words: &[&str]) -> Result<()> {
         ["test"] => test::run(&setup::all()?)?,
         ["ci"] => ci::run()?,
         ["ci", "images"] => ci::images()?,
+        ["ci", "beside"] => ci::beside()?,
         ["ci", "board"] => ci::board()?,
         ["budget"] => budget::run(&setup::all()?)?,
         ["size"] => {
