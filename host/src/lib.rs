@@ -5,4 +5,5 @@ pub mod cmd;
 pub mod config;
 pub mod monitor;
 pub mod probe;
+mod quoted;
 pub mod schemas;

@@ -404,3 +404,30 @@ fn a_primitive_that_is_not_there_is_named_with_the_place_where_it_may_be() {
         assert!(help.contains("`tactus list`"), "{line}: {help}");
     }
 }
+
+/// The change that makes it fail: a recording that reads well is a success.
+#[test]
+fn a_run_that_missed_its_goal_is_no_success_and_its_report_says_so() {
+    let folder = learned();
+    let at = folder.path();
+    succeeds(at, &format!("{DEVICE} run reach.toml --mode open --record run.csv"));
+    let text = std::fs::read_to_string(at.join("run.csv")).unwrap();
+    let names: Vec<&str> = text.lines().find(|line| line.starts_with("cycle,")).unwrap().split(',').collect();
+    let x = names.iter().position(|name| *name == "x_m").unwrap();
+    let moved = |line: &str| {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Some(Ok(value)) = fields.get(x).map(|field| field.parse::<f64>()) {
+            fields[x] = (value + 0.1).to_string();
+        }
+        fields.join(",") + "\n"
+    };
+    std::fs::write(at.join("missed.csv"), text.lines().map(moved).collect::<String>()).unwrap();
+    let before = std::fs::read(at.join("reach.toml")).unwrap();
+    let (_, code, message, help) = refused(at, "statistics reach.toml run.csv missed.csv");
+    assert!(code == "E640" && message.contains("missed.csv: the arm ended 1"), "{code} {message}");
+    assert!(help.contains("leave this one out"), "{help}");
+    assert!(std::fs::read(at.join("reach.toml")).unwrap() == before, "nothing was remembered");
+    succeeds(at, "report missed.csv");
+    let page = std::fs::read_to_string(at.join("report.html")).unwrap();
+    assert!(page.contains("away from its goal") && !page.contains("arrived, and held"), "the report tells it");
+}

@@ -31,6 +31,7 @@ mod looking;
 mod monitor;
 mod mutated;
 mod outcomes;
+mod overtaken;
 mod payload;
 mod schemas;
 mod secret;

@@ -306,8 +306,9 @@ fn rehearsal(
     let mut client = trial::connect(&options, interrupt)?;
     client.upload(&movement.to_image()?, |_, _, _| {})?;
     procedure::make_ready(&mut client, true, |_| {})?;
-    let (bytes, _) = procedure::play_once(&mut client, movement, options_of_rehearsal, &notes(), &mut |_| {})?;
-    Ok(Recording::parse(Path::new(&format!("rehearsal {seed}")), &bytes)?)
+    let mut cycles = Vec::new();
+    procedure::play_once(&mut client, movement, options_of_rehearsal, &mut |cycle| cycles.push(*cycle))?;
+    parse(&cycles, &format!("rehearsal {seed}"))
 }
 
 fn parse(cycles: &[link::Telemetry], name: &str) -> Result<Recording, PreparationError> {

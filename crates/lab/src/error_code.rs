@@ -304,7 +304,7 @@ error_codes! {
     ExpectationSpeed = 636: "the expected force was recorded at a speed too different", "`--speed`",
         "run at the speed of the rehearsal, or rehearse at this one";
     GoalMissed = 637: "the arm did not reach its goal",
-        "something was in the way, or the goal is out of the arm's reach", "`tactus plot --run FILE` shows where it went";
+        "something was in the way, or the goal is out of the arm's reach", "`tactus plot --run FILE --output FILE.png` shows where it went";
     NotRemembered = 640: "nothing could be remembered from the recordings",
         "they are of another movement, or too few", "give recordings of this primitive, all at the same speed";
     RecordingOfOthers = 641: "the recordings are not of the same movement", "another file was meant",
@@ -319,7 +319,7 @@ error_codes! {
     SettingsInvalid = 645: "the file of settings cannot be used", "a misspelt key, or a value that no arm can have",
         "`tactus config dump` writes a sound one to compare with";
     SettingsOfOthers = 646: "the settings are those of another arm", "another file was meant, or the board was changed",
-        "calibrate this arm; if it is the same arm with another board: `tactus config restore --force`";
+        "calibrate this arm; if it is the same arm with another board: `tactus config restore FILE --force`";
     SettingsDiffer = 647: "the device keeps other settings than the file has",
         "it was calibrated since, or another device was meant",
         "`tactus config restore FILE` has the device keep the file's, `tactus config dump -o FILE --force` the reverse";

@@ -18,7 +18,8 @@ pub struct FaultGuide {
 /// For a fault whose cause only has to be removed.
 const CLEAR: &str = "`tactus stop --clear-fault`";
 /// For a fault after which the joint angles are not to be trusted.
-const ZERO: &str = "bring the arm home, zero it again (`tactus run --at-home`), then `tactus stop --clear-fault`";
+const ZERO: &str =
+    "bring the arm home, zero it again (`tactus run PRIMITIVE --at-home`), then `tactus stop --clear-fault`";
 /// For a fault after which the device starts the bus anew. Under a fault it would have the brakes set again.
 const CLEAR_AND_ACTIVATE: &str = "`tactus stop --clear-fault`, then activate at the pendant";
 /// For what was done at the pendant.

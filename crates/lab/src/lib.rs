@@ -18,6 +18,7 @@ pub mod input_file;
 pub mod learn;
 pub mod line_health;
 pub mod load;
+pub mod outcome;
 pub mod output_file;
 pub mod plan;
 pub mod plot;

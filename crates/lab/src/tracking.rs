@@ -38,6 +38,26 @@ pub struct HandTracking {
     pub end_rad: [f64; 4],
 }
 
+/// Distance (m) and angle (rad) from the end of its plan within which an arm counts as arrived. Force control leaves
+/// the plan by millimetres where the hand touches something; by more than this it was held up.
+pub const GOAL_TOLERANCE: (f64, f64) = (0.05, 15.0 * std::f64::consts::PI / 180.0);
+
+/// An arm that rests elsewhere than its plan ends.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error(
+    "the arm ended {:.0} mm and {:.0} degrees away from its goal; at most {:.0} mm and {:.0} degrees count as there",
+    .away * 1e3,
+    .turned.to_degrees(),
+    GOAL_TOLERANCE.0 * 1e3,
+    GOAL_TOLERANCE.1.to_degrees()
+)]
+pub struct Missed {
+    /// Distance from the goal, m.
+    pub away: f64,
+    /// Angle from the goal, rad.
+    pub turned: f64,
+}
+
 /// Reason for which a run cannot be compared with its plan or with another run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum Lack {
@@ -95,6 +115,15 @@ impl Tracking {
             orientation_max_rad: largest(|error| error.1),
             orientation_end_rad: last.1,
         })
+    }
+
+    /// Returns the distance of the arm from the end of its plan; `None` where it is at its goal.
+    #[must_use]
+    pub fn missed(&self) -> Option<Missed> {
+        let missed = Missed { away: self.position_end_m, turned: self.orientation_end_rad };
+        // Not a number is no goal reached either.
+        let is_there = missed.away <= GOAL_TOLERANCE.0 && missed.turned <= GOAL_TOLERANCE.1;
+        (!is_there).then_some(missed)
     }
 }
 
@@ -183,5 +212,25 @@ mod tests {
         let text = HAND.replace("_d_rad", "_x").replace("_rad", "_y");
         assert_eq!(HandTracking::of_run(&recording(&text)).unwrap_err().lack, Lack::Hands);
         assert_eq!(Tracking::of_run(&recording(HAND)).unwrap_err().lack, Lack::Poses);
+    }
+
+    #[test]
+    fn an_arm_that_ends_away_from_its_goal_has_missed_it_and_the_distance_is_told() {
+        let ended = |position_end_m: f64, orientation_end_rad: f64| {
+            let tracking = Tracking {
+                samples: 1,
+                position_rms_m: 0.0,
+                position_max_m: 0.0,
+                position_end_m,
+                orientation_rms_rad: 0.0,
+                orientation_max_rad: 0.0,
+                orientation_end_rad,
+            };
+            tracking.missed()
+        };
+        assert_eq!(ended(0.012, 0.05), None);
+        let words = ended(0.22, 75f64.to_radians()).unwrap().to_string();
+        assert!(words.contains("220 mm and 75 degrees away"), "{words}");
+        assert!(ended(0.0, 0.3).is_some() && ended(0.06, 0.0).is_some() && ended(f64::NAN, 0.0).is_some());
     }
 }

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use control::{Fault, State, flags};
 use lab::demonstration::Recording;
 use lab::learn::{LearnOptions, learn};
+use lab::outcome::Outcome;
 use lab::primitive_file::{ExpectationTable, PrimitiveFile};
-use lab::report::{Outcome, ReportedRun, page};
+use lab::report::{ReportedRun, page};
 
 use crate::common;
 
@@ -93,6 +94,31 @@ fn the_end_of_a_run_is_what_came_right_behind_it_whatever_else_was_recorded() {
     assert_eq!(outcome(Some((State::SoftStop, Fault::None)), State::Hold), Outcome::Stopped);
     let touched = Some((State::SoftStop, Fault::ContactForce));
     assert_eq!(outcome(touched, State::Hold), Outcome::Faulted(Fault::ContactForce));
+}
+
+/// The change that makes it fail: whoever holds after a run has arrived.
+#[test]
+fn an_arm_that_holds_away_from_its_goal_has_not_arrived() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(recorded(folder.path(), "run.csv", None)).unwrap();
+    let names: Vec<&str> = text.lines().find(|line| line.starts_with("cycle,")).unwrap().split(',').collect();
+    let x = names.iter().position(|name| *name == "x_m").unwrap();
+    let held_up = |metres: f64| {
+        let moved = |line: &str| {
+            let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if let Some(Ok(value)) = fields.get(x).map(|field| field.parse::<f64>()) {
+                fields[x] = (value + metres).to_string();
+            }
+            fields.join(",")
+        };
+        let file = folder.path().join("moved.csv");
+        std::fs::write(&file, text.lines().map(moved).collect::<Vec<_>>().join("\n") + "\n").unwrap();
+        ReportedRun::read(&file, None).unwrap().outcome
+    };
+    assert_eq!(held_up(0.04), Outcome::ArrivedUnlike);
+    let missed = held_up(0.06);
+    assert!(matches!(missed, Outcome::Missed(_)) && !missed.is_good(), "{missed:?}");
+    assert!(missed.words().contains("60 mm and 0 degrees away"), "{}", missed.words());
 }
 
 #[test]

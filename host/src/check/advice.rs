@@ -7,6 +7,7 @@ use lab::procedure::{Change, ChangeKind};
 use link::Goal;
 
 use super::{CheckReport, Course, Limit, UNFIT};
+use crate::quoted;
 
 /// Slowest run, as a factor of the taught speed.
 const SLOWEST: f64 = 0.1;
@@ -75,7 +76,7 @@ impl Course {
         if let Some(goal) = self.goal.position {
             let _ = write!(options, " --goal {}", place(goal));
         }
-        let name = file.display();
+        let name = quoted::path(file);
         let command = if file.is_file() {
             format!("`tactus check {name}{options}`")
         } else {

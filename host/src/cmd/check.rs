@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::{ErrorCode, Failure, Global};
 use crate::check::{self, Course};
+use crate::quoted;
 use lab::demonstration::Recording;
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
 use link::Goal;
@@ -67,10 +68,11 @@ pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Fa
         PrimitiveFileError::Model { .. } => ErrorCode::PrimitiveModel,
         PrimitiveFileError::ExpectationModel { .. } | PrimitiveFileError::ExpectationDuration { .. } => {
             return Failure::new(ErrorCode::ExpectationStale, refused, cause)
-                .help(format!("record it again: `tactus rehearse {}`", path.display()));
+                .help(format!("record it again: `tactus rehearse {}`", quoted::path(path)));
         }
         PrimitiveFileError::StatisticsAlone { .. } => {
-            let help = format!("`tactus rehearse {}` records an expectation; then gather them again", path.display());
+            let help =
+                format!("`tactus rehearse {}` records an expectation; then gather them again", quoted::path(path));
             return Failure::new(ErrorCode::NoExpectation, refused, cause).help(help);
         }
         PrimitiveFileError::Io { .. } if !path.exists() && path.with_extension("toml").is_file() => {
@@ -78,7 +80,7 @@ pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Fa
             return Failure::of_file(ErrorCode::PrimitiveUnreadable, refused, cause).help(help);
         }
         PrimitiveFileError::Syntax { .. } if Recording::read(path).is_ok() => {
-            let help = format!("this is a recording: `tactus learn {}` makes a primitive of it", path.display());
+            let help = format!("this is a recording: `tactus learn {}` makes a primitive of it", quoted::path(path));
             return Failure::new(ErrorCode::PrimitiveUnreadable, refused, cause).help(help);
         }
         PrimitiveFileError::Schema { .. } => ErrorCode::PrimitiveSchema,

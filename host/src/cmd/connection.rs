@@ -12,6 +12,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use super::{ErrorCode, Failure, Global, Output, interruption};
+use crate::quoted;
 use lab::client::{Client, Halted, Interrupt};
 use lab::device::{Device, OpenError};
 use lab::error::{HostError, explain_blocked};
@@ -167,6 +168,7 @@ fn reach(
 /// The help of a socket that cannot be opened; what only a serial line needs helps nobody there.
 fn socket_help(address: &Address, error: &TransportError) -> Option<String> {
     let nobody = || {
+        let address = quoted::text(&address.to_string());
         format!("nobody serves there: `tactus sim --listen {address}` serves a simulated arm, in a terminal of its own")
     };
     match (address, error) {

@@ -10,6 +10,7 @@ use lab::primitive_file::PrimitiveFile;
 use super::{ErrorCode, Failure, Global, Output};
 use lab::client::Client;
 use lab::device::Device;
+use lab::procedure::CycleWriter;
 
 /// Opens a file to be written; none of `inputs` is replaced, and nothing is without `--force` or a person's yes.
 ///
@@ -114,6 +115,15 @@ impl RecordingFile {
     pub(super) fn create(path: &Path, global: &Global, inputs: &[&Path], doing: &'static str) -> Result<Self, Failure> {
         let file = Counted { file: create(path, global, inputs, doing)?, head: 0, lines: 0 };
         Ok(Self { file, path: path.to_owned(), doing })
+    }
+
+    /// Begins the recording with its notes.
+    ///
+    /// # Errors
+    /// The system refuses.
+    pub(super) fn begin<'a>(&'a mut self, notes: &str) -> std::io::Result<CycleWriter<impl Write + use<'a>>> {
+        self.expect_notes(notes);
+        CycleWriter::new(&mut self.file, notes)
     }
 
     /// Says how many lines stand above the first sample.

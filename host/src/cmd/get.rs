@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, connection, files};
+use crate::quoted;
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::HostError;
@@ -63,6 +64,7 @@ pub(super) fn failure(error: HostError, name: &Name, global: &Global, doing: &st
     let failure = error.into_failure(format!("{doing} '{name}'"));
     let file = format!("{name}.toml");
     if Path::new(&file).is_file() {
+        let file = quoted::text(&file);
         return failure.help(format!("there is a file {file}: `tactus run {file}`, or `tactus upload {file}`"));
     }
     if global.forgets() {

@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, files};
+use crate::quoted;
 use lab::demonstration::{DemonstrationError, Preparation, Recording, RecordingError};
 use lab::learn::feedback::FeedbackOptions;
 use lab::learn::hand::HandMotion;
@@ -194,20 +195,19 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
     }
 }
 
-/// The command line once more, with another option: what was asked for beside it must not be lost.
+/// The command line once more, with another option: all that was asked for beside it, wherever it stands, must not be
+/// lost.
 fn again(option: &str) -> String {
-    let given = std::env::args_os().skip_while(|word| word != "learn").skip(1);
-    let words: Vec<String> = given.map(|word| for_shell(&word.to_string_lossy())).collect();
-    format!("tactus learn {option} {}", words.join(" "))
+    let given = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+    again_with(given.collect(), option)
 }
 
-/// A word as a shell takes it for one.
-fn for_shell(word: &str) -> String {
-    let is_plain = |letter: char| letter.is_alphanumeric() || "-_./,=:+@%".contains(letter);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
+/// These words with another option, which stands before a `--`: behind it nothing is one.
+fn again_with(mut words: Vec<String>, option: &str) -> String {
+    let end = words.iter().position(|word| word == "--").unwrap_or(words.len());
+    words.insert(end, option.to_owned());
+    let words: Vec<String> = words.iter().map(|word| quoted::text(word)).collect();
+    format!("tactus {}", words.join(" "))
 }
 
 /// Six or ten gains; without the last four force does not bend the fingers.
@@ -240,4 +240,18 @@ pub(super) fn numbers<const COUNT: usize>(text: &str) -> Result<[f64; COUNT], St
     }
     let found = values.len();
     values.try_into().map_err(|_| format!("{COUNT} numbers are expected, {found} are given"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The change that makes it fail: the option is put where `learn` stands, and what stands before that is left out.
+    #[test]
+    fn a_command_line_is_repeated_with_all_that_was_asked_for() {
+        let again = |line: &str| again_with(line.split(' ').map(str::to_owned).collect(), "--no-trim");
+        assert_eq!(again("--force learn a.csv"), "tactus --force learn a.csv --no-trim");
+        assert_eq!(again("--device learn learn -- -a.csv"), "tactus --device learn learn --no-trim -- -a.csv");
+        assert_eq!(again_with(vec!["learn".to_owned(), "my a.csv".to_owned()], "-x"), "tactus learn 'my a.csv' -x");
+    }
 }

@@ -1,20 +1,29 @@
 //! `tactus rehearse`: plays a primitive without feedback, and remembers what the sensors measured.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use control::plan::bounds;
-use link::RunOptions;
+use link::image::stored_crc;
+use link::{Listing, RunOptions};
 use serde::Serialize;
 
-use super::{ErrorCode, Failure, Global, Output, Table, connection, files, upload};
+use super::files::{self, RecordingFile};
+use super::{ErrorCode, Failure, Global, Output, Table, connection, upload};
 use crate::check::Course;
+use crate::quoted;
+use lab::client::Client;
 use lab::demonstration::{Origin, RATE, Recording};
+use lab::device::Device;
 use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
 use lab::output_file::OutputFile;
 use lab::primitive_file::{LARGEST_DURATION_DEVIATION, PrimitiveFile};
-use lab::procedure::{self, CHANNELS, FlagCounts, Mode};
+use lab::procedure::{self, CHANNELS, FlagCounts, Mode, ProcedureError, recording_text};
+use lab::tracking::Tracking;
+
+const DOING: &str = "rehearse";
 
 /// Options of `rehearse`.
 #[derive(Debug, Clone, Args)]
@@ -86,8 +95,8 @@ pub struct Report {
 /// # Errors
 /// The primitive is wrong, the device refuses, a run ends early, or what was recorded cannot be used.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
-    const DOING: &str = "rehearse";
     let output = global.output();
+    let before = std::fs::read(&command.primitive).ok();
     let mut file = upload::read(&command.primitive, DOING)?;
     let movement = file.without_memory();
     keepable(&movement, command.speed)?;
@@ -100,6 +109,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut records = record_files(command, &file.name, global)?.into_iter();
     let started = Instant::now();
     let mut client = connection::open(global, DOING, |options| surround(options, command.surroundings))?;
+    // The file keeps what it remembers; of any other version the device may have the only copy.
+    let other = upload::other_version(&mut client, &movement, DOING)?;
+    if let Some(old) = other.filter(|old| !is_image_of(&file, old)) {
+        upload::say_replaced(&old, output);
+    }
     upload::send(&mut client, &movement, output, DOING)?;
     connection::ready(&mut client, command.at_home, output, DOING)?;
     let origin = Origin {
@@ -114,21 +128,15 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut flags = Vec::new();
     for trial in 1..=command.trials {
         let bar = output.bar((file.movement.duration / command.speed).ceil() as u64, "s", "to the start");
-        let played = procedure::play_once(&mut client, &movement, options, &notes, &mut |samples| {
+        let once = Trial { movement: &movement, options, notes: &notes, path: path_of(command, &file.name, trial) };
+        let played = once.play(&mut client, records.next(), output, &mut |samples| {
             bar.set_message(format!("rehearsal {trial} of {}", command.trials));
             bar.set_position((samples as f64 / RATE) as u64);
         });
         bar.finish_and_clear();
-        let (bytes, outcome) = played.map_err(|error| connection::failure(error, DOING))?;
-        let path = path_of(command, &file.name, trial);
-        if let Some(record) = records.next() {
-            files::fill(record, &bytes, DOING)?;
-        }
-        let recording = Recording::parse(&path, &bytes).map_err(|cause| {
-            Failure::new(ErrorCode::RecordingReadsBackWrong, "rehearse: the recording reads back wrong", cause)
-        })?;
+        let (recording, seen) = played?;
         recordings.push(recording);
-        flags.push(outcome.flags);
+        flags.push(seen);
     }
     let gaps = client.gaps().telemetry;
     connection::tell_speed(&client, started, output);
@@ -143,8 +151,16 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         !command.equal_weights,
     )
     .map_err(|cause| memory_failure(cause, "rehearse: no expectation was stored"))?;
+    let is_changed = target == command.primitive && std::fs::read(&target).ok() != before;
+    if is_changed {
+        return Err(keep_beside(&file, output_file, &target)?);
+    }
     write(&file, output_file, &target, DOING)?;
     output.say(format!("wrote {}", target.display()));
+    if !global.forgets() {
+        let upload = format!("tactus upload {}", quoted::path(&target));
+        output.say(format!("the device has the movement without what it remembers; `{upload}` gives it that"));
+    }
     caution(&file, &flags, statistics_dropped.then_some(&*target), output);
     let report = Report {
         name: file.name.clone(),
@@ -159,6 +175,63 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     output.result(&report, report.to_text())
 }
 
+/// One trial of a rehearsal.
+struct Trial<'a> {
+    movement: &'a PrimitiveFile,
+    options: RunOptions,
+    notes: &'a str,
+    /// Where its recording goes, or what it is called.
+    path: PathBuf,
+}
+
+impl Trial<'_> {
+    /// Plays it. Its cycles go to the file as they come, so that what ends it in the middle leaves what was measured.
+    fn play(
+        &self,
+        client: &mut Client<Device>,
+        mut record: Option<RecordingFile>,
+        output: Output,
+        progress: &mut dyn FnMut(usize),
+    ) -> Result<(Recording, FlagCounts), Failure> {
+        let failed = |error| connection::failure(error, DOING);
+        let recording = |cause: std::io::Error| failed(ProcedureError::Recording(cause));
+        let writer = record.as_mut().map(|record| record.begin(self.notes));
+        let mut writer = writer.transpose().map_err(recording)?;
+        let (mut cycles, mut written) = (Vec::new(), Ok(()));
+        let played = procedure::play_once(client, self.movement, self.options, &mut |cycle| {
+            cycles.push(*cycle);
+            progress(cycles.len());
+            // A disk that is full is no reason to stop an arm in the middle of a movement.
+            if let (Some(writer), Ok(())) = (&mut writer, &written) {
+                written = writer.write(cycle);
+            }
+        });
+        let written = written.and_then(|()| writer.map_or(Ok(()), |writer| writer.finish().map(|_| ())));
+        let outcome = played.map_err(failed).and_then(|outcome| written.map(|()| outcome).map_err(recording));
+        let outcome = match record {
+            Some(record) => record.end(outcome, output)?,
+            None => outcome?,
+        };
+        let bytes = recording_text(&cycles, self.notes).map_err(recording)?;
+        let recording = Recording::parse(&self.path, &bytes).map_err(|cause| {
+            Failure::new(ErrorCode::RecordingReadsBackWrong, "rehearse: the recording reads back wrong", cause)
+        })?;
+        match Tracking::of_run(&recording).ok().and_then(|tracking| tracking.missed()) {
+            Some(missed) => Err(Failure::new(ErrorCode::GoalMissed, "rehearse: no expectation was stored", missed)),
+            None => Ok((recording, outcome.flags)),
+        }
+    }
+}
+
+/// Keeps the primitive beside a file that somebody has changed meanwhile; the failure that says so.
+fn keep_beside(file: &PrimitiveFile, mut output: OutputFile, target: &Path) -> Result<Failure, Failure> {
+    let text = file.checked_text().map_err(|cause| super::check::failure(cause, target, DOING))?;
+    output.write_all(text.as_bytes()).map_err(|cause| Failure::of_file(ErrorCode::FileFailed, DOING, cause))?;
+    let words = format!("{} was changed while it was rehearsed", target.display());
+    let help = "rehearse what the file holds now; what was learned of the one before is kept beside it";
+    Ok(Failure::new(ErrorCode::WouldReplace, DOING, words).help(help).kept(output.keep()))
+}
+
 /// Warns of what a person should know about the primitive that was written; `dropped` is its file, if it has lost its
 /// statistics.
 fn caution(file: &PrimitiveFile, flags: &[FlagCounts], dropped: Option<&Path>, output: Output) {
@@ -169,12 +242,17 @@ fn caution(file: &PrimitiveFile, flags: &[FlagCounts], dropped: Option<&Path>, o
         output.warn(format!(
             "its statistics were dropped: they were gathered with another expectation. No run is watched until \
              `tactus statistics {} RECORDING...` has new ones",
-            target.display()
+            quoted::path(target)
         ));
     }
     if file.feedback.is_none() {
         output.warn("the primitive has no gains for feedback: learn it again, then rehearse it");
     }
+}
+
+/// True if what the device stores is this file, with all that it remembers.
+fn is_image_of(file: &PrimitiveFile, stored: &Listing) -> bool {
+    file.to_image().is_ok_and(|image| stored_crc(&image) == stored.crc)
 }
 
 /// Refuses a speed at which the expectation could not be kept.
@@ -192,10 +270,10 @@ fn keepable(movement: &PrimitiveFile, speed: f64) -> Result<(), Failure> {
 }
 
 /// Opens the files of the recordings, if they are to be kept.
-fn record_files(command: &Cmd, name: &str, global: &Global) -> Result<Vec<OutputFile>, Failure> {
+fn record_files(command: &Cmd, name: &str, global: &Global) -> Result<Vec<RecordingFile>, Failure> {
     let trials = 1..=if command.record_dir.is_some() { command.trials } else { 0 };
     trials
-        .map(|trial| files::create(&path_of(command, name, trial), global, &[&command.primitive], "rehearse"))
+        .map(|trial| RecordingFile::create(&path_of(command, name, trial), global, &[&command.primitive], DOING))
         .collect()
 }
 

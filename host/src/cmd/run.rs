@@ -1,6 +1,5 @@
 //! `tactus run`: the arm plays a primitive, watched and written down.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -15,6 +14,7 @@ use super::run_folder::RunFolder;
 use super::run_report::{DryRun, Report, report};
 use super::{ErrorCode, Failure, Global, Output, connection, get, upload};
 use crate::check::Course;
+use crate::quoted;
 use lab::client::Client;
 use lab::demonstration::{Origin, RATE};
 use lab::device::Device;
@@ -22,19 +22,15 @@ use lab::line_health::{LineHealth, Snapshot};
 use lab::output_file;
 use lab::primitive_file::PrimitiveFile;
 use lab::procedure::{
-    self, Change, ChangeKind, CycleWriter, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, recording_text,
+    self, Change, ChangeKind, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, recording_text,
 };
-use lab::tracking::Tracking;
+use lab::tracking::Missed;
 use lab::transport::{Address, SimulatorOptions};
 
 const DOING: &str = "run";
 
 /// Rest that is recorded at the goal, s.
 const POST_ROLL: f64 = 1.0;
-
-/// Distance (m) and angle (rad) from the end of its plan within which an arm counts as arrived. Force control leaves
-/// the plan by millimetres where the hand touches something; by more than this it was held up.
-const GOAL_TOLERANCE: (f64, f64) = (0.05, 15.0 * std::f64::consts::PI / 180.0);
 
 /// Options of `run`.
 #[derive(Debug, Clone, Args)]
@@ -123,14 +119,15 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Some(folder) => Some(create(&folder.recording())?),
         None => record,
     };
-    let mut ended = carry_out(command, &mut client, &asked, record, started, output);
-    if let Some(lost) = ended.as_ref().ok().and_then(|report| missed(report.tracking.as_ref()?)) {
+    let mut ended = carry_out(command, &mut client, &asked, record, started, global);
+    if let Some(lost) = ended.as_ref().ok().and_then(|report| report.tracking.as_ref()?.missed()) {
         ended = ended.and_then(|report| Err(short_of_goal(&report, lost, global)?));
     }
     ended = ended.map_err(|failure| connection::afterwards(failure, global));
     if let Some(folder) = folder {
         let kept = folder.finish(&mut ended, client.hello());
-        output.say(format!("everything about this run is in {}", folder.path().display()));
+        let all = if kept.is_ok() { "everything" } else { "not everything" };
+        output.say(format!("{all} about this run is in {}", folder.path().display()));
         let name = Some(files::text(folder.path()));
         ended = ended.and_then(|report| kept.map(|()| Report { folder: name, ..report }));
     }
@@ -145,7 +142,7 @@ fn put(command: &Cmd, client: &mut Client<Device>, file: &PrimitiveFile, output:
         return Err(connection::failure(ProcedureError::Recording(cause), DOING));
     }
     if let Some(old) = upload::other_version(client, file, DOING)? {
-        output.say(format!("replaces another version of '{}' in the device (checksum 0x{:08x})", file.name, old.crc));
+        upload::say_replaced(&old, output);
     }
     upload::send(client, file, output, DOING)?;
     output.say(format!("'{}' is in the device", file.name));
@@ -159,29 +156,43 @@ fn carry_out(
     asked: &Asked<'_>,
     mut record: Option<RecordingFile>,
     started: Instant,
-    output: Output,
+    global: &Global,
 ) -> Result<Report, Failure> {
+    let output = global.output();
     let preconditions = meet(client, asked, command.at_home, output)?;
     let ready_s = client.is_virtual().then(|| client.now().as_secs_f64());
     let played = play(command, client, asked.file, record.as_mut(), output);
     connection::tell_speed(client, started, output);
     let played = played.map_err(|error| connection::failure(error, DOING));
-    let report = match record {
-        Some(record) => record.end(played, output)?,
-        None => played?,
+    let (report, written) = match (played, record) {
+        (Ok(played), record) => {
+            let (report, written) = played;
+            let written = written.map_err(|cause| connection::failure(ProcedureError::Recording(cause), DOING));
+            (report, record.map_or(Ok(()), |record| record.end(written, output)))
+        }
+        (Err(failure), Some(record)) => return record.end(Err(failure), output),
+        (Err(failure), None) => return Err(failure),
     };
+    if let Err(failure) = written {
+        // The run itself went to its end: how it went is told all the same.
+        return Err(with_result(failure, &report, global)?);
+    }
     if !client.is_simulated() {
         output.say("the arm holds its goal; `tactus stop` ends that");
     }
     Ok(Report { ready_s, preconditions, ..report })
 }
 
-/// The failure of a run that ended elsewhere than at its goal; its report is told all the same.
-fn short_of_goal(report: &Report, missed: String, global: &Global) -> Result<Failure, Failure> {
+/// The failure of a run that ended elsewhere than at its goal.
+fn short_of_goal(report: &Report, missed: Missed, global: &Global) -> Result<Failure, Failure> {
+    with_result(Failure::new(ErrorCode::GoalMissed, DOING, missed), report, global)
+}
+
+/// A failure behind a run that was played to its end; its report is told all the same.
+fn with_result(failure: Failure, report: &Report, global: &Global) -> Result<Failure, Failure> {
     if !global.json {
         global.output().result(report, report.to_text())?;
     }
-    let failure = Failure::new(ErrorCode::GoalMissed, DOING, missed);
     Ok(match serde_json::to_value(report) {
         Ok(data) => failure.data(data),
         Err(_) => failure,
@@ -253,13 +264,14 @@ fn open(command: &Cmd, global: &Global) -> Result<Client<Device>, Failure> {
     })
 }
 
+/// Plays the primitive; beside the report, whether its recording could be written.
 fn play(
     command: &Cmd,
     client: &mut Client<Device>,
     file: &PrimitiveFile,
     record: Option<&mut RecordingFile>,
     output: Output,
-) -> Result<Report, ProcedureError> {
+) -> Result<(Report, std::io::Result<()>), ProcedureError> {
     let spinner = output.spinner("moving to the start");
     let at_start = procedure::go_to_start(client, &file.start, |passed| {
         spinner.set_message(format!("moving to the start, {passed:.0} s"));
@@ -280,7 +292,7 @@ fn play(
     let request = RunRequest { rest: POST_ROLL, changes, ..RunRequest::new(name, file.movement.duration, options) };
 
     let notes = notes(client, file, command);
-    let mut writer = record.map(|record| start(record, &notes)).transpose()?;
+    let mut writer = record.map(|record| record.begin(&notes)).transpose()?;
     let bar = output.bar((file.movement.duration / command.speed).ceil() as u64, "s", "running");
     let (mut cycles, mut written, mut is_running) = (Vec::new(), Ok(()), false);
     let before = Snapshot::of(client)?;
@@ -299,17 +311,14 @@ fn play(
     });
     bar.finish_and_clear();
     let outcome = outcome?;
-    written?;
-    if let Some(writer) = writer {
-        writer.finish()?;
-    }
+    let written = written.and_then(|()| writer.map_or(Ok(()), |writer| writer.finish().map(|_| ())));
     let bytes = recording_text(&cycles, &notes)?;
     tell(&outcome, output);
     let answers = client.take_answer_times();
     let after = Snapshot::of(client)?;
     let line = Some(LineHealth::between(&before, &after, &cycles, &answers));
     let report = report(client, file, command.mode, &bytes, outcome, &after.statistics)?;
-    Ok(Report { line, ..report })
+    Ok((Report { line, ..report }, written))
 }
 
 /// Says what a person should know about how the run went.
@@ -341,7 +350,7 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
         return Ok(());
     }
     let doing = format!("run refused: mode `{}`", command.mode.name());
-    let name = file.file.display();
+    let name = quoted::path(&file.file);
     // One that was read from the device has no file yet.
     let help = match file.file.is_file() {
         true => format!("tactus rehearse {name}"),
@@ -393,29 +402,6 @@ fn notes(client: &Client<Device>, file: &PrimitiveFile, command: &Cmd) -> String
     format!("Tactus recording of a run of '{}', {} Hz\n{origin}", file.name, control::RATE_HZ)
 }
 
-/// Begins the file of a recording.
-fn start<'a>(record: &'a mut RecordingFile, notes: &str) -> std::io::Result<CycleWriter<impl Write + use<'a>>> {
-    record.expect_notes(notes);
-    CycleWriter::new(&mut record.file, notes)
-}
-
-/// Words for an arm that rests elsewhere than its plan ends; `None` where it is at its goal.
-fn missed(tracking: &Tracking) -> Option<String> {
-    let (away, turned) = (tracking.position_end_m, tracking.orientation_end_rad);
-    // Not a number is no goal reached either.
-    let is_there = away <= GOAL_TOLERANCE.0 && turned <= GOAL_TOLERANCE.1;
-    (!is_there).then(|| {
-        format!(
-            "the arm ended {:.0} mm and {:.0} degrees away from its goal; at most {:.0} mm and {:.0} degrees count as \
-             there",
-            away * 1e3,
-            turned.to_degrees(),
-            GOAL_TOLERANCE.0 * 1e3,
-            GOAL_TOLERANCE.1.to_degrees()
-        )
-    })
-}
-
 /// A time and a goal, as in `3.5:0.7,0.1,0.2`.
 fn goal_at(text: &str) -> Result<Change, String> {
     let (time, goal) = timed(text)?;
@@ -440,25 +426,6 @@ fn timed(text: &str) -> Result<(f64, &str), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn an_arm_that_ends_away_from_its_goal_has_missed_it_and_the_distance_is_told() {
-        let ended = |position_end_m: f64, orientation_end_rad: f64| {
-            missed(&Tracking {
-                samples: 1,
-                position_rms_m: 0.0,
-                position_max_m: 0.0,
-                position_end_m,
-                orientation_rms_rad: 0.0,
-                orientation_max_rad: 0.0,
-                orientation_end_rad,
-            })
-        };
-        assert_eq!(ended(0.012, 0.05), None);
-        let words = ended(0.22, 75f64.to_radians()).unwrap();
-        assert!(words.contains("220 mm and 75 degrees away"), "{words}");
-        assert!(ended(0.0, 0.3).is_some() && ended(0.06, 0.0).is_some() && ended(f64::NAN, 0.0).is_some());
-    }
 
     #[test]
     fn changes_carry_their_time_and_nonsense_is_refused() {

@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, Table, connection, files};
+use crate::quoted;
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::Capability;
@@ -187,7 +188,7 @@ fn diff(path: &Path, global: &Global) -> Result<(), Failure> {
     }
     global.output().say(format!("{}{}", table(&data, "device", "file").to_string().trim_end(), rest(&data)));
     let failure = Failure::new(ErrorCode::SettingsDiffer, DOING, count);
-    Err(failure.data(serde_json::json!(data)).help(format!("`tactus config restore {}`", path.display())))
+    Err(failure.data(serde_json::json!(data)).help(format!("`tactus config restore {}`", quoted::path(path))))
 }
 
 fn restore(path: &Path, global: &Global) -> Result<(), Failure> {

@@ -18,6 +18,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, Output, connection};
+use crate::quoted;
 use bus::BusServer;
 use lab::client::Interrupt;
 use lab::device::Device;
@@ -67,6 +68,16 @@ pub struct Cmd {
 enum Listener {
     Unix(UnixListener, PathBuf),
     Tcp(TcpListener),
+}
+
+impl Listener {
+    /// The address to name, with the port that the system chose where 0 was asked for.
+    fn address(&self, asked: &str) -> String {
+        match self {
+            Self::Tcp(listener) => listener.local_addr().map_or(asked.to_owned(), |address| format!("tcp:{address}")),
+            Self::Unix(..) => asked.to_owned(),
+        }
+    }
 }
 
 impl Drop for Listener {
@@ -124,8 +135,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         }
         output.say(format!("the arm's bus is served at {served} (socketcand, interface {ARM_INTERFACE})"));
     }
-    if listener.is_some() {
-        output.say(format!("a simulated arm listens; in another terminal: `tactus --device {} list`", command.listen));
+    if let Some(listener) = &listener {
+        let address = quoted::text(&listener.address(&command.listen));
+        output.say(format!("a simulated arm listens; in another terminal: `tactus --device {address} list`"));
     }
     output.say(format!("the pendant's buttons, typed here: {}", pendant::WORDS));
     let served = serve(command, &mut device, listener.as_ref(), bus.as_mut(), &interrupt, output);

@@ -1,5 +1,6 @@
 //! `tactus statistics`: makes the statistics of successful runs, by which the device watches the next runs.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -9,6 +10,7 @@ use serde::Serialize;
 use super::{ErrorCode, Failure, Global, files, rehearse, upload};
 use lab::demonstration::Recording;
 use lab::learn::memory::remember_successes;
+use lab::outcome::Outcome;
 
 /// Options of `statistics`.
 #[derive(Debug, Clone, Args)]
@@ -59,6 +61,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     for recording in recordings.iter().filter(|recording| recording.origin.primitive.is_none()) {
         output.warn(format!("{} does not name its movement", recording.file.display()));
     }
+    recordings.iter().try_for_each(success)?;
+    let modes: BTreeSet<&str> = recordings.iter().filter_map(|recording| recording.origin.mode.as_deref()).collect();
+    if modes.len() > 1 {
+        let modes = modes.into_iter().collect::<Vec<_>>().join(", ");
+        output.warn(format!(
+            "the runs are of several modes ({modes}): the differences between these are taken for usual"
+        ));
+    }
     let summary = remember_successes(&mut file, &recordings)
         .map_err(|cause| rehearse::memory_failure(cause, "statistics: nothing was remembered"))?;
     rehearse::write(&file, output_file, &target, DOING)?;
@@ -81,6 +91,22 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             rehearse::memory_table(&summary)
         ),
     )
+}
+
+/// Refuses a run that is known not to have come to its goal. One whose recording ends with the movement may have.
+fn success(recording: &Recording) -> Result<(), Failure> {
+    let outcome = Outcome::of(recording);
+    match outcome {
+        Outcome::Arrived | Outcome::ArrivedUnlike | Outcome::Unfinished => return Ok(()),
+        Outcome::NeverBegan
+        | Outcome::FaultedBefore(_)
+        | Outcome::Missed(_)
+        | Outcome::Faulted(_)
+        | Outcome::Stopped => {}
+    }
+    let cause = format!("{}: {}", recording.file.display(), outcome.words());
+    Err(Failure::new(ErrorCode::NotRemembered, "statistics: nothing was remembered", cause)
+        .help("statistics are of runs that succeeded: leave this one out"))
 }
 
 /// Data of `tactus --json statistics`.

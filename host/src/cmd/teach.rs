@@ -32,7 +32,7 @@ pub struct Cmd {
     /// Posture the arm moves to before it becomes weightless: seven joint angles, rad. A simulated arm has a default
     #[arg(long, value_name = "Q1,...,Q7", value_parser = start_posture, allow_hyphen_values = true)]
     pub from: Option<Posture>,
-    /// Duration of the recording, s. Without it: until Enter is pressed, or until the simulated teacher has let go
+    /// Duration of the recording, s. Without it: until Enter is pressed, at most 120, or a simulated teacher lets go
     #[arg(long, value_name = "SECONDS", value_parser = recorded)]
     pub duration: Option<f64>,
     /// I have brought the arm to its home pose: zero it there if need be
@@ -183,7 +183,8 @@ fn record(
     if guided {
         output.say("a simulated teacher guides the hand");
     } else if enter.is_some() {
-        output.say("guide the arm; press Enter when the movement is shown");
+        output
+            .say(format!("guide the arm; press Enter when the movement is shown, within {LONGEST_DEMONSTRATION:.0} s"));
     }
     let spinner = output.spinner("recording");
     let limit = command.duration.unwrap_or(LONGEST_DEMONSTRATION);
@@ -194,6 +195,12 @@ fn record(
     });
     spinner.finish_and_clear();
     let samples = shown?.samples;
+    if enter.as_ref().is_some_and(|enter| !enter.is_finished()) {
+        output.warn(format!(
+            "nobody pressed Enter within {limit:.0} s: the recording has ended by itself, perhaps in the middle of the \
+             movement"
+        ));
+    }
     let ended_unsaid = enter.filter(|enter| enter.is_finished()).is_some_and(|enter| !enter.join().unwrap_or(false));
     Ok((samples, client.gaps().telemetry, !ended_unsaid))
 }

@@ -107,6 +107,15 @@ pub(super) fn other_version(
     Ok(there.filter(|there| there.crc != stored_crc(&image)))
 }
 
+/// Says that another version goes.
+pub(super) fn say_replaced(old: &Listing, output: Output) {
+    output.say(format!(
+        "replaces another version of '{}' in the device (checksum 0x{:08x})",
+        old.name.as_str(),
+        old.crc
+    ));
+}
+
 /// Reads a primitive that fits this arm.
 pub(super) fn read(path: &Path, doing: &str) -> Result<PrimitiveFile, Failure> {
     let refused = |cause| super::check::failure(cause, path, doing);

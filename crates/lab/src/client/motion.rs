@@ -134,6 +134,23 @@ impl<T: Transport> Client<T> {
         }
     }
 
+    /// Waits until an arm that is stopping stands still, for a second at most: the next command may ask for that.
+    fn come_to_rest(&mut self) -> Result<(), HostError> {
+        let end = self.now() + REST_TIMEOUT;
+        let (mut before, mut looked) = (self.status()?.q, self.now());
+        while self.now() < end {
+            let now = self.status()?.q;
+            if self.now().saturating_sub(looked) < LOOK {
+                continue;
+            }
+            if before.iter().zip(&now).all(|(before, now)| (before - now).abs() < STILL) {
+                break;
+            }
+            (before, looked) = (now, self.now());
+        }
+        Ok(())
+    }
+
     /// A motion of the hand begins that takes so long, s; 0 is as long as the device chooses, or an initialisation
     /// takes.
     pub(super) fn hand_may_move_for(&mut self, seconds: f32) {
@@ -151,7 +168,7 @@ impl<T: Transport> Client<T> {
         }
         // Stopping waits for answers, and must not be interrupted by the wish to stop.
         let interrupt = std::mem::take(&mut self.interrupt);
-        let stopped = self.stop();
+        let stopped = self.stop().and_then(|()| self.come_to_rest());
         self.interrupt = interrupt;
         match stopped {
             Ok(()) => HostError::Interrupted,
@@ -159,6 +176,15 @@ impl<T: Transport> Client<T> {
         }
     }
 }
+
+/// Largest change (rad) of a joint in [`LOOK`] for which an arm counts as at rest: 0.05 rad/s.
+const STILL: f32 = 0.001;
+
+/// Time between two looks at the joints of an arm that is stopping.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Longest time for which an arm that is stopping is waited for.
+const REST_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// True for a state that the device would end when this host fell silent.
 pub(super) fn is_moving(state: u8) -> bool {

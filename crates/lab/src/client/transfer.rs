@@ -59,6 +59,10 @@ impl<T: Transport> Client<T> {
         let mut window = Window::new(started);
         progress(0);
         while window.done < image.len() {
+            // Whoever sends the wrong one takes it back before it is stored.
+            if self.interrupt.is_raised() {
+                return Err(self.interrupted());
+            }
             while window.has_room() && window.next < image.len() {
                 let part = image.get(window.next..).unwrap_or_default();
                 let part = part.get(..CHUNK_BYTES).unwrap_or(part);

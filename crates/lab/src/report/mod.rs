@@ -6,14 +6,13 @@ mod figures;
 mod html;
 mod watched;
 
-use std::ops::Range;
 use std::path::Path;
 
-use control::{Fault, State};
 use dmp::CanonicalSystem;
 
 use crate::demonstration::{Recording, RecordingError, layout, recording};
 use crate::input_file;
+use crate::outcome::Outcome;
 use crate::primitive_file::PrimitiveFile;
 use crate::procedure::FlagCounts;
 use crate::tracking::Tracking;
@@ -43,54 +42,6 @@ pub struct ReportedRun {
     pub missing: usize,
     /// Tracking of the plan, where poses were recorded.
     pub tracking: Option<Tracking>,
-}
-
-/// The end of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
-    /// No plan was played.
-    NeverBegan,
-    /// No plan was played, because a fault came before.
-    FaultedBefore(Fault),
-    /// The arm came to the end of the movement and held.
-    Arrived,
-    /// The same, but what was measured on the way was not as in the successful runs.
-    ArrivedUnlike,
-    /// A fault stopped it.
-    Faulted(Fault),
-    /// It was stopped, by a person or another program.
-    Stopped,
-    /// The recording ends before the movement does.
-    Unfinished,
-}
-
-impl Outcome {
-    /// True for the one that was wanted.
-    #[must_use]
-    pub fn is_good(self) -> bool {
-        self == Self::Arrived
-    }
-
-    /// One sentence without full stop.
-    #[must_use]
-    pub fn words(self) -> String {
-        match self {
-            Self::NeverBegan => "no movement was played".to_owned(),
-            Self::FaultedBefore(fault) => {
-                format!("stopped by a fault before any movement was played ({fault:?}): {fault}")
-            }
-            Self::Arrived => "arrived, and held the goal".to_owned(),
-            Self::ArrivedUnlike => {
-                "arrived, and held the goal, but not as the successful runs: what was to be done may have failed"
-                    .to_owned()
-            }
-            Self::Faulted(fault) => format!("stopped by a fault ({fault:?}): {fault}"),
-            Self::Stopped => "stopped by a person or by another program".to_owned(),
-            Self::Unfinished => {
-                "the recording ends in the middle of the movement, as when somebody stops it".to_owned()
-            }
-        }
-    }
 }
 
 impl ReportedRun {
@@ -135,16 +86,12 @@ impl ReportedRun {
             });
         }
         happenings.sort_by(|a, b| a.time.total_cmp(&b.time));
-        let is_unlike = running.flags.iter().flatten().any(|sample| sample & control::flags::SURPRISE != 0);
         Ok(ReportedRun {
             name: file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
             notes,
             progress,
             runs: runs.len(),
-            outcome: match outcome(&recording, &last) {
-                Outcome::Arrived if is_unlike => Outcome::ArrivedUnlike,
-                outcome => outcome,
-            },
+            outcome: Outcome::of(&recording),
             happenings,
             flags,
             missing: running.missing_samples,
@@ -184,32 +131,4 @@ impl ReportedRun {
 fn progress(phase: f64, alpha: f64) -> f64 {
     // Added so that no progress is not written as -0.
     if phase > 0.0 { (-phase.ln() / alpha).clamp(0.0, 1.0) + 0.0 } else { 0.0 }
-}
-
-/// The end of the run of these samples: what came right behind it counts. A fault that was cleared before, and what the
-/// arm did afterwards, are other stories.
-fn outcome(recording: &Recording, run: &Range<usize>) -> Outcome {
-    let fault = |samples: Range<usize>| {
-        let codes = recording.fault.iter().flatten().take(samples.end).skip(samples.start);
-        let mut faults = codes.filter_map(|code| u8::try_from(*code).ok().and_then(Fault::from_code));
-        faults.find(|fault| *fault != Fault::None)
-    };
-    if run.is_empty() {
-        return fault(0..recording.len()).map_or(Outcome::NeverBegan, Outcome::FaultedBefore);
-    }
-    let states: Vec<Option<State>> = recording.state.iter().flatten().map(|name| named(name)).collect();
-    let behind = run.end;
-    // Until the arm is taken up again: that clears the fault.
-    let taken_up = |state: &Option<State>| matches!(state, Some(State::Hold | State::Gravity | State::Approach));
-    let end = states.iter().skip(behind).position(taken_up).map_or(recording.len(), |at| behind + at);
-    match (states.get(behind), fault(behind..end)) {
-        (Some(Some(State::Hold)), _) => Outcome::Arrived,
-        (_, Some(fault)) => Outcome::Faulted(fault),
-        (Some(_), None) => Outcome::Stopped,
-        (None, None) => Outcome::Unfinished,
-    }
-}
-
-fn named(name: &str) -> Option<State> {
-    State::ALL.into_iter().find(|state| state.name() == name)
 }

@@ -287,6 +287,27 @@ fn an_interrupt_stops_the_arm_before_the_command_ends() {
     assert_eq!(client.transport().half.state, State::SoftStop);
 }
 
+/// The change that makes it fail: parts are sent whatever the user wishes.
+#[test]
+fn an_interrupt_in_the_middle_of_an_upload_leaves_the_device_what_it_had() {
+    let mut client = connected();
+    let interrupt = Interrupt::never();
+    client.set_interrupt(interrupt.clone());
+    let image = image("reach", 3.0);
+    let error = client
+        .upload(&image, |_, done, _| {
+            if done > 0 {
+                interrupt.raise()
+            }
+        })
+        .unwrap_err();
+    assert!(matches!(error, HostError::Left) && error.code().exit() as u8 == 130, "{error:?}");
+    client.set_interrupt(Interrupt::never());
+    assert_eq!(client.list().unwrap(), [], "nothing was stored");
+    assert_eq!(client.status().unwrap().upload_received, None, "and nothing is under way");
+    client.upload(&image, |_, _, _| {}).unwrap();
+}
+
 /// The change that makes it fail: a motion of the hand counts as going on until somebody stops it.
 #[test]
 fn an_interrupt_long_after_a_motion_of_the_hand_lets_an_arm_that_holds_be() {

@@ -1,0 +1,162 @@
+//! Commands that are interrupted, or whose files somebody changes meanwhile: what was measured stays, nothing goes
+//! unasked.
+
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::common;
+
+const DEVICE: &str = "--device sil:world=simple --non-interactive";
+
+/// A shell that starts the tests in the background has them ignore Ctrl-C, and so would the command.
+fn command(folder: &Path, line: &str) -> Command {
+    let mut command = Command::new("env");
+    command.arg("--default-signal=INT").arg(env!("CARGO_BIN_EXE_tactus")).current_dir(folder);
+    command.env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE");
+    command.args(line.split_whitespace()).stdin(Stdio::null());
+    command
+}
+
+#[track_caller]
+fn succeeds(folder: &Path, line: &str) -> Output {
+    let output = command(folder, line).output().unwrap();
+    assert!(output.status.success(), "{line}: {}", said(&output));
+    output
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn begun(folder: &Path, line: &str) -> Child {
+    command(folder, line).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Waits until a file has so many bytes.
+#[track_caller]
+fn grows(child: &mut Child, file: &Path, bytes: u64) {
+    let begun = Instant::now();
+    while !std::fs::metadata(file).is_ok_and(|file| file.len() >= bytes) {
+        assert!(begun.elapsed() < Duration::from_secs(60), "{} does not grow", file.display());
+        assert_eq!(child.try_wait().unwrap(), None, "it ended by itself");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn learned(duration: f64) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    common::demonstration(folder.path(), duration);
+    succeeds(folder.path(), "learn demo.csv --name reach -o reach.toml");
+    folder
+}
+
+/// The change that makes it fail: a trial is written when it is complete.
+#[test]
+fn what_an_interrupted_rehearsal_has_measured_is_kept() {
+    let folder = learned(20.0);
+    let at = folder.path();
+    let mut rehearsal = begun(at, &format!("{DEVICE} rehearse reach.toml --record-dir kept"));
+    let part = at.join("kept/reach-1.csv.part");
+    grows(&mut rehearsal, &part, 50_000);
+    assert!(Command::new("kill").args(["-s", "INT", &rehearsal.id().to_string()]).status().unwrap().success());
+    let ended = rehearsal.wait_with_output().unwrap();
+    assert_eq!(ended.status.code(), Some(130), "{}", said(&ended));
+    assert!(part.is_file() && said(&ended).contains("reach-1.csv.part"), "{}", said(&ended));
+    assert!(std::fs::read_to_string(&part).unwrap().lines().count() > 20, "its samples");
+    let left: Vec<_> = at.join("kept").read_dir().unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left.len(), 1, "of the trials that never began nothing is left: {left:?}");
+}
+
+/// The change that makes it fail: the primitive is always put back.
+#[test]
+fn a_primitive_that_is_changed_while_it_is_rehearsed_is_not_overwritten() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    succeeds(at, "learn demo.csv --name reach --kernels 30 -o other.toml");
+    let other = std::fs::read(at.join("other.toml")).unwrap();
+    let mut rehearsal = begun(at, &format!("{DEVICE} --json rehearse reach.toml --record-dir kept"));
+    grows(&mut rehearsal, &at.join("kept/reach-1.csv.part"), 0);
+    std::fs::write(at.join("reach.toml"), &other).unwrap();
+    let ended = rehearsal.wait_with_output().unwrap();
+    let told: Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!(told["error"]["code"], "E230", "{told}");
+    assert!(std::fs::read(at.join("reach.toml")).unwrap() == other, "what somebody wrote is there");
+    let kept = std::fs::read_to_string(at.join("reach.toml.part")).unwrap();
+    assert!(kept.contains("[expectation]"), "what was learned is beside it");
+}
+
+/// The change that makes it fail: a recording that cannot be put at its place ends the command before its report.
+#[test]
+fn a_run_that_was_played_tells_how_it_went_though_its_recording_has_no_place() {
+    let folder = learned(20.0);
+    let at = folder.path();
+    let mut run = begun(at, &format!("{DEVICE} --json run reach.toml --record run.csv"));
+    grows(&mut run, &at.join("run.csv.part"), 50_000);
+    std::fs::write(at.join("run.csv"), "mine").unwrap();
+    let ended = run.wait_with_output().unwrap();
+    let told: Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!((told["error"]["code"].as_str(), ended.status.code()), (Some("E230"), Some(2)), "{told}");
+    assert!(told["result"]["tracking"]["samples"].as_u64().is_some_and(|samples| samples > 1000), "{told}");
+    assert_eq!(std::fs::read_to_string(at.join("run.csv")).unwrap(), "mine");
+}
+
+/// The change that makes it fail: a rehearsal does not look at what is there.
+#[test]
+fn a_rehearsal_says_what_it_replaces_in_the_device_and_what_the_device_lacks_then() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    let device = "--device sil:world=simple,flash=arm.flash --non-interactive";
+    succeeds(at, &format!("{device} upload reach.toml"));
+    let first = said(&succeeds(at, &format!("{device} rehearse reach.toml --trials 1")));
+    assert!(!first.contains("replaces") && first.contains("`tactus upload reach.toml` gives it that"), "{first}");
+    // What the device has is this file, with all that it remembers.
+    succeeds(at, &format!("{device} upload reach.toml --force"));
+    let again = said(&succeeds(at, &format!("{device} rehearse reach.toml --trials 1")));
+    assert!(!again.contains("replaces"), "{again}");
+    succeeds(at, "learn demo.csv --name reach --kernels 30 -o other.toml");
+    let other = said(&succeeds(at, &format!("{device} rehearse other.toml --trials 1")));
+    assert!(other.contains("replaces another version of 'reach'"), "{other}");
+    let forgotten = said(&succeeds(at, &format!("{DEVICE} rehearse other.toml --trials 1")));
+    assert!(!forgotten.contains("tactus upload"), "nothing stays there: {forgotten}");
+}
+
+/// The change that makes it fail: a path goes into a command line as it is.
+#[test]
+fn an_advised_command_names_a_path_with_spaces_as_one_word() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    std::fs::rename(at.join("demo.csv"), at.join("my demo.csv")).unwrap();
+    let output = command(at, "check").arg("my demo.csv").output().unwrap();
+    assert!(said(&output).contains("`tactus learn 'my demo.csv'`"), "{}", said(&output));
+}
+
+/// The change that makes it fail: a command ends as soon as its arm has left the motion, and is still braking.
+#[test]
+fn an_arm_stands_still_once_the_command_that_was_interrupted_has_ended() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    let mut arm = begun(at, "--device sil:world=simple sim --listen unix:arm.sock");
+    grows(&mut arm, &at.join("arm.sock"), 0);
+    let mut run = begun(at, "--device unix:arm.sock --non-interactive run reach.toml --record run.csv");
+    grows(&mut run, &at.join("run.csv.part"), 0);
+    let angles = || -> Vec<f64> {
+        let told: Value = serde_json::from_slice(&succeeds(at, "--device unix:arm.sock --json status").stdout).unwrap();
+        told["q_rad"].as_array().unwrap().iter().map(|angle| angle.as_f64().unwrap()).collect()
+    };
+    let apart =
+        |one: &[f64], other: &[f64]| one.iter().zip(other).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max);
+    // On the way to its start.
+    let (started, rest) = (Instant::now(), angles());
+    while apart(&rest, &angles()) < 0.1 {
+        assert!(started.elapsed() < Duration::from_secs(60), "it does not move");
+    }
+    assert!(Command::new("kill").args(["-s", "INT", &run.id().to_string()]).status().unwrap().success());
+    assert_eq!(run.wait().unwrap().code(), Some(130));
+    let (before, after) = (angles(), angles());
+    assert!(apart(&before, &after) < 0.005, "{before:?} {after:?}");
+    assert!(Command::new("kill").args(["-s", "INT", &arm.id().to_string()]).status().unwrap().success());
+    arm.wait().unwrap();
+}
