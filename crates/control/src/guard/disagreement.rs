@@ -134,6 +134,7 @@ impl<R: Real> Disagreement<R> {
     /// Forgets what was seen: no feedback acts.
     pub(crate) fn reset(&mut self) {
         self.still = [0; JOINTS];
+        self.swings_back = 0;
         self.forget_pushes();
     }
 

@@ -138,6 +138,39 @@ fn a8_no_sound_encoder_is_called_stuck_as_an_approach_begins_whatever_the_fricti
     }
 }
 
+/// A contact that has stopped the arm and was cleared is over: it hides no encoder that stands still in the approach
+/// behind it. Up to 1.07 s, 1.07 rad, and 0.89 m/s of the hand then.
+///
+/// The change that makes it fail: a stop does not forget that the arm swung back from what had pushed it.
+#[test]
+fn a8_an_encoder_that_stands_still_in_the_approach_after_a_contact_is_found_as_soon() {
+    let (mut slowest, mut farthest) = (0.0f64, 0.0f64);
+    for friction in [0.0, 0.3, 1.0] {
+        for motor in 0..4 {
+            let mut rig = Rig::<f32>::new(START, 1);
+            rig.plant.coulomb *= friction;
+            rig.command(Command::Hold);
+            rig.run_for(2.0);
+            rig.command(Command::Tare);
+            rig.plant.push[0] = -75.0;
+            rig.until(State::SoftStop, 0.05);
+            rig.plant.push[0] = 0.0;
+            assert_eq!(rig.cycle.fault(), Fault::ContactForce);
+            rig.run_for(1.5);
+            rig.command(Command::ClearFault);
+            rig.run_for(1.0);
+            freeze(&mut rig, motor);
+            rig.command(Command::Approach { q: TARGET.map(|q| q as f32), duration: 0.0 });
+            let (seconds, way, _) = stop(&mut rig);
+            println!("friction {friction}, M{}: {seconds:.3} s, {way:.3} rad", motor + 1);
+            assert_eq!(rig.cycle.fault(), Fault::EncoderStuck);
+            (slowest, farthest) = (slowest.max(seconds), farthest.max(way));
+        }
+    }
+    println!("{slowest:.3} s, {farthest:.3} rad");
+    assert!(slowest < 0.25 && farthest < 0.1, "{slowest} s, {farthest} rad");
+}
+
 #[test]
 fn a8_a_stuck_encoder_is_not_cleared_while_its_joint_may_be_elsewhere() {
     let mut rig = moving(false, 1.0, None);
