@@ -123,7 +123,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 if options.feedback || options.force_control {
                     self.may_use_force(primitive, measured)?;
                 }
-                let hand = self.hand.answering();
+                // Its worms hold a silent hand where it was last.
+                let hand = self.hand.state();
                 let begun = (options, self.caution == Caution::Slowed);
                 Run::start(&mut self.run, primitive, q, &measured.pose, hand, begun)?;
                 self.supervisor.take(Trigger::Run, Fault::None)?;

@@ -165,6 +165,31 @@ fn a_hand_far_from_where_the_primitive_starts_is_refused_and_no_hand_is_not() {
     rig.until(State::Hold, 10.0);
 }
 
+/// Its worms hold a hand that is silent for a moment where it is: it is as far from the start of the primitive as it
+/// was. Such a run began, and the hand was thrown open at 2.23 rad/s once it was heard again.
+///
+/// The change that makes it fail: a hand that is lost as a run begins is taken for none.
+#[test]
+fn e2_a_run_is_refused_that_begins_while_its_hand_is_silent_and_far_from_its_start() {
+    let mut rig = holding();
+    rig.load(&primitive(&closing(0.25, [0.0; 3]))).expect("loads");
+    rig.command(Command::MoveHand { q: [0.0, 1.2, 1.2, 1.2], duration: 1.5 });
+    rig.run_for(3.0);
+    rig.plant.hand.as_mut().expect("fitted").silent = true;
+    rig.run_for(0.05);
+    assert!(rig.last.expect("ran").record.flags & flags::HAND_LOST != 0);
+    let event = rig.tick(Some(Command::Run(RunOptions::default()))).event;
+    rig.run_for(0.1);
+    rig.plant.hand.as_mut().expect("fitted").silent = false;
+    let fastest = (0..periods(1.5)).fold(0.0f64, |fastest, _| {
+        rig.tick(None);
+        fastest.max(hand(&rig).dq[1].abs())
+    });
+    println!("{event:?}, {fastest:.2} rad/s");
+    assert_eq!(event, Some(Event::Refused(Refusal::HandTooFar)));
+    assert!(fastest < 0.1, "{fastest} rad/s");
+}
+
 #[test]
 fn closing_on_an_object_reads_as_a_negative_gauge_whatever_its_zero() {
     for unloaded in [1900.0, 2000.0, 2100.0] {
