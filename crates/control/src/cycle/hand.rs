@@ -122,6 +122,10 @@ impl<R: Real> HandDrive<R> {
             Aim::Move(..) => state.q,
             Aim::Follow(reference) => reference.q,
         };
+        if goal.iter().zip(&state.q).skip(1).any(|(goal, now)| goal > now) {
+            // Fingers that are to close may hold something from now on: the last moment for a first zero.
+            self.estimator.tare_first();
+        }
         self.expected = None;
         self.controller.reset();
         self.aim = Aim::Move(HandMotion::new(&from, goal, duration), 0);

@@ -185,6 +185,13 @@ impl<R: Real> HandEstimator<R> {
         present
     }
 
+    /// Tares, unless that was done.
+    pub fn tare_first(&mut self) {
+        if !self.tared {
+            self.tare();
+        }
+    }
+
     /// Tares each gauge, unless the gauges have been tared already and this one differs from that by more than a gauge
     /// drifts.
     pub fn tare_drift(&mut self) {

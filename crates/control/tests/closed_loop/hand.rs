@@ -7,7 +7,7 @@ use control::time::periods;
 use control::{Calibration, Event, PERIOD, Payload, Refusal, State, flags};
 
 use crate::hand_plant::Hand;
-use crate::primitives::{Design, GOAL, START, primitive};
+use crate::primitives::{Design, GOAL, START, adapting, primitive};
 use crate::rig::Rig;
 
 const OPEN: [f64; 4] = [0.0, 0.25, 0.25, 0.25];
@@ -188,6 +188,55 @@ fn e2_a_run_is_refused_that_begins_while_its_hand_is_silent_and_far_from_its_sta
     println!("{event:?}, {fastest:.2} rad/s");
     assert_eq!(event, Some(Event::Refused(Refusal::HandTooFar)));
     assert!(fastest < 0.1, "{fastest} rad/s");
+}
+
+/// Nobody has tared a hand since its start, a move closes it on something, and the first run is to hold that. Then the
+/// hand is opened, empty, for a run that is to keep it so; how far that closes the hand (rad), how fast (rad/s), and
+/// the torque that the first run was told of as it began (N m).
+fn kept_open(tared: bool) -> (f64, f64, f64) {
+    let mut rig = Rig::<f32>::new(START, 1);
+    rig.safety = puck::SafetyMode::Idle;
+    rig.run_for(1.0);
+    rig.safety = puck::SafetyMode::Active;
+    rig.command(Command::Hold);
+    rig.run_for(1.0);
+    let object = [Some((0.2, 30.0)); 3];
+    rig.plant.hand = Some(Hand { object, ..Hand::new([0.0, 0.05, 0.05, 0.05]) });
+    rig.run_for(1.0);
+    if tared {
+        rig.command(Command::Tare);
+    }
+    rig.command(Command::MoveHand { q: [0.0, 0.33, 0.33, 0.33], duration: 1.0 });
+    rig.run_for(2.5);
+    rig.load(&primitive(&closing(0.33, [-0.45; 3]))).expect("loads");
+    rig.command(Command::Run(adapting()));
+    rig.run_for(0.1);
+    let told = f64::from(rig.last.expect("ran").record.gauges[0]);
+    rig.until(State::Hold, 10.0);
+    rig.plant.hand.as_mut().expect("fitted").object = [None; 3];
+    rig.command(Command::MoveHand { q: OPEN.map(|q| q as f32), duration: 1.0 });
+    rig.run_for(2.0);
+    rig.load(&primitive(&closing(OPEN[1], [0.0; 3]))).expect("loads");
+    rig.command(Command::Run(adapting()));
+    let (mut far, mut fast) = (0.0f64, 0.0f64);
+    for _ in 0..periods(4.0) {
+        rig.tick(None);
+        (far, fast) = (far.max(hand(&rig).q[1]), fast.max(hand(&rig).dq[1].abs()));
+    }
+    (far, fast, told)
+}
+
+/// A grip that is taken for the zero is pulled on by every run behind it: one closed the empty hand at 1.65 rad/s.
+///
+/// The change that makes it fail: the first zero of the gauges is that of the first run, whatever is gripped by then.
+#[test]
+fn b5_a_grip_is_not_taken_for_the_zero_of_gauges_that_nobody_has_tared() {
+    let (tared, untared) = (kept_open(true), kept_open(false));
+    println!("{tared:.2?} tared by a person, {untared:.2?} not");
+    for (far, fast, told) in [tared, untared] {
+        assert!(told < -0.15, "{told} N m told of a grip");
+        assert!(far < OPEN[1] + 0.1 && fast < 0.3, "{far} rad at {fast} rad/s with nothing in the hand");
+    }
 }
 
 #[test]
