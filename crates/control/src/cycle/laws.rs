@@ -14,7 +14,7 @@ use crate::plan::reference::{HandReference, JointReference, TaskReference};
 use crate::plan::run::Senses;
 use crate::real::{Real, at_least, at_most, sqrt};
 use crate::sense::observer::Trust;
-use crate::time::{PERIOD, periods};
+use crate::time::{PERIOD, few_periods, periods};
 use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6, Vector7, Wrench};
 
 /// Length of the damping that carries the arm while gravity torque builds up after arming: 0.5 s, in control periods.
@@ -31,6 +31,12 @@ const TAUGHT_SPEED: f64 = 0.18;
 /// reduced speed of the standards for work beside a person, lies in between: an arm that was shoved falls below it by
 /// itself.
 const BRAKED_SPEED: f64 = 0.30;
+
+/// Age up to which a load that a silent sensor measured last is believed: 0.3 s, in control periods.
+const BORNE_AGE: u8 = few_periods(0.3);
+
+/// Speed at which a hand rises from which its load has been taken (m/s). A load that is carried rests.
+const UNLOADED_SPEED: f64 = 0.02;
 
 /// Largest speed of the hand to which a change of goal may add (m/s).
 const HAND_SPEED: f64 = 0.8;
@@ -134,20 +140,28 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// load where it was.
     #[inline(never)]
     fn lead(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
-        let borne = self.borne(measured);
         let mut demand = self.float(measured);
-        if let Law::Gravity(support) = &mut self.law
-            && support.carries()
-        {
-            support.keep(borne);
-            demand.torque.0 += support.torque(measured.frames);
+        if self.law.support().carries() {
+            let borne =
+                self.borne(measured, sinking(measured, &measured.frames.jacobian().twist(&measured.state.dq.0)));
+            if let Law::Gravity(support) = &mut self.law {
+                support.keep(borne);
+                demand.torque.0 += support.torque(measured.frames);
+            }
         }
         demand
     }
 
-    /// The load (N) that the hand is measured to bear; none without a sensor.
-    fn borne(&self, measured: &Measured<'_, R>) -> R {
-        if self.senses(measured) == Senses::Lost { R::constant(0.0) } else { -measured.wrench.force.z }
+    /// The load (N) that the hand is measured to bear; none without a sensor. One that has just fallen silent is
+    /// believed, unless the hand rises: from that its load has been taken.
+    fn borne(&self, measured: &Measured<'_, R>, sinking: R) -> R {
+        let believed = match self.senses(measured) {
+            Senses::Lost => {
+                self.wrench.age().is_some_and(|age| age <= BORNE_AGE) && sinking > R::constant(-UNLOADED_SPEED)
+            }
+            _ => true,
+        };
+        if believed { -measured.wrench.force.z } else { R::constant(0.0) }
     }
 
     /// Gravity compensation and damping; what else was there is ramped away, and gravity too where the arm is lowered.
@@ -155,9 +169,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     #[inline(never)]
     fn stop(&mut self, measured: &Measured<'_, R>) -> Demand<R> {
         let twist = measured.frames.jacobian().twist(&measured.state.dq.0);
-        // What is not measured does not sink.
-        let sinking = if measured.state.missing == 0 { -twist[2] } else { R::constant(0.0) };
-        let borne = self.borne(measured);
+        let sinking = sinking(measured, &twist);
+        let borne = self.borne(measured, sinking);
         let (rest, share, support) = match &mut self.law {
             Law::SoftStop(ramp, support) => {
                 support.step(sinking, borne, R::constant(0.0));
@@ -319,6 +332,11 @@ fn speed_load<R: Real>(frames: &Frames<R>, dq: &JointVelocities<R>) -> R {
 pub(super) fn falls<R: Real>(measured: &Measured<'_, R>) -> bool {
     let [elbow, tip, _] = measured.frames.watched_speeds(&measured.state.dq, R::constant(TIP_REACH));
     at_least(elbow, tip) > R::constant(FALLING)
+}
+
+/// Speed at which the hand sinks (m/s). What is not measured does not sink.
+fn sinking<R: Real>(measured: &Measured<'_, R>, twist: &Vector6<R>) -> R {
+    if measured.state.missing == 0 { -twist[2] } else { R::constant(0.0) }
 }
 
 /// Speed of the hand (m/s).

@@ -4,8 +4,8 @@
 //! to 1 m/s, until it lay on something. So a force upwards grows while the hand sinks, up to that of 1.2 kg. Where the
 //! hand rises it shrinks as fast. Nor does it stay above what the wrist's sensor measures that the hand bears: an arm
 //! that a person has pressed down does not spring up, and no joint is driven to its limit by a load that is gone.
-//! Without a sensor there is no force. Once a fault is cleared the arm floats with the force it had, as far as the hand
-//! still bears it, and a hold takes it over.
+//! Without a sensor there is no force; one that falls silent is believed for a moment, unless the hand rises. Once a
+//! fault is cleared the arm floats with the force it had, as far as the hand still bears it, and a hold takes it over.
 
 use crate::model::kinematics::Frames;
 use crate::real::{Real, at_least, at_most};
