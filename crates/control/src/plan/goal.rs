@@ -18,6 +18,9 @@ const CROWDED: (f64, f64) = (0.5, 0.8);
 /// Below this `1 - s` a goal does not act yet.
 const NO_EFFECT: f64 = 1e-3;
 
+/// Above this `1 - s` a goal that is there stays there: what a faster run has yet to move is little.
+const SETTLED: f64 = 0.95;
+
 /// Longest way to a commanded goal: 30 s, in control periods. One that the arm cannot follow to is left.
 const GOAL_TIME: u16 = periods(30.0);
 
@@ -28,8 +31,10 @@ pub(crate) struct GoalFilter<R: Real> {
     commanded: Pose<R>,
     /// `w` of position (m) and orientation (rad, axes of the base).
     shift: (Vector3<R>, Vector3<R>),
-    /// Control periods for which the goal may still move; 0 once it is there.
+    /// Control periods for which the goal may still move; 0 once it is there for good.
     left: u16,
+    /// True while it is behind what the phase asks for.
+    lags: bool,
     /// True if an orientation was commanded.
     turns: bool,
 }
@@ -37,7 +42,8 @@ pub(crate) struct GoalFilter<R: Real> {
 impl<R: Real> GoalFilter<R> {
     /// The goal rests here.
     pub(crate) fn at(goal: Pose<R>) -> Self {
-        GoalFilter { base: goal, commanded: goal, shift: (Vector3::zeros(), Vector3::zeros()), left: 0, turns: false }
+        let shift = (Vector3::zeros(), Vector3::zeros());
+        GoalFilter { base: goal, commanded: goal, shift, left: 0, lags: false, turns: false }
     }
 
     /// Begins to move to another goal; what is not given stays.
@@ -45,7 +51,7 @@ impl<R: Real> GoalFilter<R> {
         self.commanded.position = position.unwrap_or(self.commanded.position);
         self.commanded.orientation = orientation.unwrap_or(self.commanded.orientation);
         self.turns |= orientation.is_some();
-        self.left = GOAL_TIME;
+        (self.left, self.lags) = (GOAL_TIME, true);
     }
 
     /// True if an orientation was commanded: only then is that of the goal to be set.
@@ -53,9 +59,14 @@ impl<R: Real> GoalFilter<R> {
         self.turns
     }
 
-    /// True until the commanded goal is reached.
+    /// True until the commanded goal is reached for good.
     pub(crate) fn moves(&self) -> bool {
         self.left > 0
+    }
+
+    /// True while the goal is behind what the phase asks for: the run waits for it.
+    pub(crate) fn lags(&self) -> bool {
+        self.lags
     }
 
     /// Moves for one control period at the phase `s`, while the plan uses the part `load` of the speed limits; returns
@@ -65,7 +76,6 @@ impl<R: Real> GoalFilter<R> {
         if self.left == 0 || part < R::constant(NO_EFFECT) {
             return None;
         }
-        self.left -= 1;
         let free = (R::constant(CROWDED.1) - load) * R::constant(1.0 / (CROWDED.1 - CROWDED.0));
         // Of a NaN neither holds, and the goal waits.
         let share = if free >= R::constant(1.0) {
@@ -81,10 +91,15 @@ impl<R: Real> GoalFilter<R> {
         let way = Vector3::from(self.commanded.position) - Vector3::from(self.base.position);
         let moved = approach(&mut self.shift.0, way * part, step.0);
         let turned = approach(&mut self.shift.1, Vector3::from(turn.rotation_vector()) * part, step.1);
-        if moved && turned {
-            self.left = 0;
+        self.lags = !(moved && turned);
+        if !self.lags {
+            // In a slow run it is there at once, and has most of its way before it once that is made fast.
+            if part > R::constant(SETTLED) {
+                self.left = 0;
+            }
             return Some(self.commanded);
         }
+        self.left -= 1;
         let scale = R::constant(1.0) / part;
         let position = Vector3::from(self.base.position) + self.shift.0 * scale;
         let turn = Quaternion::from_rotation_vector(&(self.shift.1 * scale).into());

@@ -212,7 +212,9 @@ impl<R: Real, const N: usize> Run<R, N> {
                 let _ = self.rollout.set_goal_orientation(primitive.movement(), 0, goal.orientation);
             }
         }
-        self.end = at_least(self.end, self.rollout.progress() + R::constant(FOLLOWING));
+        if self.goal.lags() {
+            self.end = at_least(self.end, self.rollout.progress() + R::constant(FOLLOWING));
+        }
     }
 
     /// Adds what takes the plan's speed against a force that was not expected. The force of this tick counts, not the

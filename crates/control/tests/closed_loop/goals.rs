@@ -194,6 +194,44 @@ fn g9_a_goal_at_the_start_acts_as_softly_as_a_late_one() {
     judge("at the start", &(worst, rig), &nominal, &place);
 }
 
+/// A goal of the start of a run that is slow has nothing to move yet: it was there at once, and came with all the speed
+/// of the run as that was made fast, which ended in `TipSpeed`.
+///
+/// The change that makes it fail: a goal is there for good once it has moved as far as the phase asks for.
+#[test]
+fn g9_a_goal_of_a_slow_run_that_is_made_fast_acts_as_softly_as_one_of_a_fast_run() {
+    for duration in [2.0, 3.0] {
+        for shift in [[0.0, -0.3, 0.0], [0.0, 0.3, 0.0], [-0.2, -0.2, 0.1]] {
+            let place = stored() + Vector3::from(shift);
+            let (fast, _) = run((duration, 2.0, false), |cycle| (cycle == 0).then(|| goal(place)));
+            for (slow, wait) in [(0.1, 6), (0.1, 300), (0.2, 6), (0.5, 6)] {
+                let mut rig = ready(duration, false);
+                rig.command(Command::Run(RunOptions { speed: slow, goal: goal(place), ..RunOptions::default() }));
+                let mut worst = Worst::default();
+                for cycle in 0..(60.0 / PERIOD) as u32 {
+                    let faster = (cycle == wait).then_some(Command::SetSpeed { factor: 2.0 });
+                    rig.tick(faster);
+                    if rig.cycle.state() != State::Run {
+                        break;
+                    }
+                    worst.see(&rig);
+                }
+                judge(&format!("{duration} s, {shift:?}, {slow} for {wait} cycles"), &(worst, rig), &fast, &place);
+            }
+        }
+    }
+}
+
+/// The change that makes it fail: a run waits for a goal until that is there for good.
+#[test]
+fn g9_a_goal_that_the_plan_keeps_up_with_makes_the_run_no_longer() {
+    let near = stored() + Vector3::new(0.01, 0.0, 0.0);
+    let [plain, led] =
+        [None, Some(goal(near))].map(|goal| run((3.0, 1.0, false), |cycle| goal.filter(|_| cycle == 0)).1.number);
+    println!("{plain} and {led} control periods");
+    assert!(led <= plain + 3, "{led} in place of {plain}");
+}
+
 #[test]
 fn g9_the_flag_of_the_feedback_tells_whether_it_bends_the_plan() {
     let mut rig = ready(3.0, true);
