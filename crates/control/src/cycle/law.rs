@@ -140,15 +140,33 @@ impl<R: Real> Posture<R> {
     pub(super) fn reference(&mut self, state: &JointState<R>, clamp: &Vector7<R>) -> JointReference<R> {
         match &mut self.approach {
             Some(approach) => {
+                let begins = approach.begins();
                 let reference = approach.step();
-                self.shift_to(reference.q);
-                reference
+                if begins {
+                    // An order is to begin within its cycle, and the arm has not been held up yet.
+                    self.shift_to(reference.q);
+                    return reference;
+                }
+                self.give_way_along(reference, state, clamp)
             }
             None => {
                 self.give_way(&state.q, &state.dq, clamp);
                 JointReference::at_rest(self.held)
             }
         }
+    }
+
+    /// Goes on along an approach; what gives way of it goes along, and lets go of an arm that is faster than the plan.
+    fn give_way_along(
+        &mut self,
+        reference: JointReference<R>,
+        state: &JointState<R>,
+        clamp: &Vector7<R>,
+    ) -> JointReference<R> {
+        self.held.0 += reference.q.0 - self.q.0;
+        self.q = reference.q;
+        self.give_way(&state.q, &JointVelocities(state.dq.0 - reference.dq.0), clamp);
+        JointReference { q: self.held, ..reference }
     }
 
     /// Gives way where the arm was pushed away by more than `clamp` (rad), and comes back slowly once it is let go. A

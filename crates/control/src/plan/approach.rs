@@ -102,6 +102,11 @@ impl<R: Real> Approach<R> {
         R::from_counts(self.length) * R::constant(PERIOD)
     }
 
+    /// True before the first control period.
+    pub fn begins(&self) -> bool {
+        self.passed == 0
+    }
+
     /// Fraction of the time passed, 0 to 1.
     pub fn progress(&self) -> R {
         R::from_counts(self.passed) / R::from_counts(self.length)
