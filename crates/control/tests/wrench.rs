@@ -255,6 +255,15 @@ fn gauges_at_their_end_are_told_and_a_bad_sample_of_them_counts_as_full_scale() 
     }
 }
 
+#[test]
+fn a_sample_that_is_lost_confirms_no_full_scale() {
+    let mut estimator = rested(&along_x(0.5), 1);
+    for (raw, force) in [(Some(along_x(79.9)), 1), (None, 0), (Some(along_x(79.9)), 1), (Some(along_x(79.9)), 2)] {
+        take(&mut estimator, raw, false);
+        assert_eq!(estimator.full_scale(), FullScale { force, torque: 0 }, "{raw:?}");
+    }
+}
+
 /// The sensor's sample of a wrench of the environment at the grasp point (world axes).
 fn sensed(frames: &Frames<f64>, force: Vector3<f64>, torque: Vector3<f64>) -> RawWrench {
     let to_sensor = frames.sensor_to_world().transpose();

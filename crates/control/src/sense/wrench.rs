@@ -150,6 +150,9 @@ impl<R: Real> WrenchEstimator<R> {
                 if sample.is_some_and(overloaded) {
                     self.saturated = true;
                     self.full_scale.force = self.full_scale.force.saturating_add(1);
+                } else if sample.is_none() {
+                    // One sample may be wild, and one that is not there does not confirm it.
+                    self.full_scale = FullScale::default();
                 }
             }
         }

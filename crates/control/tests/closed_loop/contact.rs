@@ -277,6 +277,25 @@ fn bent_by_an_outlier(outlier: f64, push: f64) -> f64 {
     path(outlier).iter().zip(&path(0.0)).map(|(a, b)| apart(a, b)).fold(0.0, f64::max)
 }
 
+/// The change that makes it fail: a sample that is lost leaves the last one at full scale.
+#[test]
+fn b2_one_wild_sample_and_lost_ones_behind_it_stop_nothing() {
+    for lost in [0, 1, 3] {
+        let mut rig = holding::<f32>(START);
+        let mut wild = rig.plant.wrench();
+        wild.force[0] = i16::MAX;
+        rig.plant.stuck = Some(wild);
+        rig.tick(None);
+        rig.plant.stuck = None;
+        rig.plant.deaf = true;
+        rig.run_for(f64::from(lost) * control::PERIOD);
+        rig.plant.deaf = false;
+        rig.run_for(0.1);
+        println!("{lost} lost: {:?}", rig.cycle.fault());
+        assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None), "{lost} lost");
+    }
+}
+
 #[test]
 fn b2_one_outlier_of_the_force_sensor_moves_the_plan_by_less_than_a_millimetre() {
     for push in [0.0, 3.0] {
