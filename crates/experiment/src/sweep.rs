@@ -60,6 +60,9 @@ impl FromStr for Sweep {
             (value * 1e6).round() / 1e6
         };
         let (name, values) = (name.trim().to_owned(), (0..=steps).map(value).collect::<Vec<_>>());
+        if let Some(pair) = values.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(format!("'{text}' has the value {} twice, rounded to a millionth; take fewer steps", pair[0]));
+        }
         for value in &values {
             format!("{name}={value}").parse::<Variation>()?;
         }
@@ -194,6 +197,14 @@ mod tests {
             let refused = wrong.parse::<Sweep>().unwrap_err();
             assert!(refused.contains(words), "{wrong}: {refused}");
         }
+    }
+
+    /// The change that makes it fail: `Sweep::from_str` does not compare neighbours, and two values have one folder.
+    #[test]
+    fn values_that_are_one_when_rounded_are_refused_before_any_trial() {
+        let refused = "joint-friction=1:1.0000001:2".parse::<Sweep>().unwrap_err();
+        assert!(refused.contains("the value 1 twice") && refused.contains("fewer steps"), "{refused}");
+        assert_eq!("joint-friction=1:1.000002:2".parse::<Sweep>().unwrap().values, [1.0, 1.000_001, 1.000_002]);
     }
 
     #[test]
