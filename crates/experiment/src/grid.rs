@@ -51,10 +51,15 @@ impl Cell {
     }
 }
 
+/// Centimetres as they are told. Divided: a product with 0.1 is not the double that is written with one digit.
+pub(super) fn centimetres(millimetres: i32) -> f64 {
+    f64::from(millimetres) / 10.0
+}
+
 /// `along:sideways` in cm.
 impl fmt::Display for Cell {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{}:{}", f64::from(self.along_mm) * 0.1, f64::from(self.sideways_mm) * 0.1)
+        write!(formatter, "{}:{}", centimetres(self.along_mm), centimetres(self.sideways_mm))
     }
 }
 
@@ -262,6 +267,22 @@ mod tests {
         assert_eq!("0:0,-4:8".parse::<Grid>().unwrap().cells.len(), 2);
         for wrong in ["", "-24", "8y6", "0:0,0:0", "1:x", "300:0"] {
             assert!(wrong.parse::<Grid>().is_err(), "{wrong}");
+        }
+    }
+
+    /// The change that makes it fail: a product with 0.1 in `centimetres`, `-2.9000000000000004`.
+    #[test]
+    fn a_cell_is_told_in_centimetres_of_at_most_one_digit_and_read_back_as_the_same() {
+        assert_eq!(Cell { along_mm: -29, sideways_mm: 137 }.to_string(), "-2.9:13.7");
+        assert_eq!(Cell { along_mm: -3, sideways_mm: -240 }.to_string(), "-0.3:-24");
+        for along_mm in -1000..=1000 {
+            let cell = Cell { along_mm, sideways_mm: -along_mm };
+            let text = cell.to_string();
+            assert!(text.len() <= "-99.9:-99.9".len(), "{text}");
+            assert_eq!(text.parse(), Ok(cell));
+            // As versions before wrote it into their results.
+            let old = format!("{}:{}", f64::from(cell.along_mm) * 0.1, f64::from(cell.sideways_mm) * 0.1);
+            assert_eq!(old.parse(), Ok(cell));
         }
     }
 

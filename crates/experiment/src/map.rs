@@ -1,6 +1,6 @@
 //! The outcomes as a map of letters for the terminal, and the figures of each mode as a table.
 
-use super::grid::Grid;
+use super::grid::{self, Grid};
 use super::results::Results;
 use super::statistics::{Spread, Summary};
 use lab::procedure::Mode;
@@ -73,7 +73,7 @@ fn finish_line(text: &mut String) {
 }
 
 fn centimetres(millimetres: i32) -> String {
-    format!("{:+}", f64::from(millimetres) * 0.1)
+    format!("{:+}", grid::centimetres(millimetres))
 }
 
 /// A mean without needless digits.
@@ -171,6 +171,16 @@ mod tests {
         assert_eq!(lines[4], "    +8  M S S S S S S S   M S S S S S S S   M S S S S S S S");
         assert_eq!(lines[9], "   -12  S S S S S S S D   S S S S S S S D   S S S S S S S D");
         assert_eq!(lines.len(), 10);
+    }
+
+    /// The change that makes it fail: a product with 0.1 instead of `grid::centimetres`.
+    #[test]
+    fn the_labels_of_a_turned_grid_are_centimetres_of_at_most_one_digit() {
+        let turned = Grid::paper().moved(30.0, [0.0, 0.0]);
+        let text = draw(&fixtures::results(&[1]), &turned);
+        let labels: Vec<&str> = text.lines().skip(4).filter_map(|line| line.split_whitespace().next()).collect();
+        assert!(labels.iter().all(|label| label.len() <= "-13.7".len()), "{labels:?}");
+        assert_eq!((centimetres(137), centimetres(-29), centimetres(40)), ("+13.7".into(), "-2.9".into(), "+4".into()));
     }
 
     #[test]
