@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use sim::world::mujoco::{ObjectKind, ObjectSpec, TABLE_TOP};
 
 use super::grid::{ApproachFrame, Cell, Grid};
+use super::header::{CELLS, CODE, Header, NO_VARIATION};
 use super::outcome::Rule;
-use super::results::{CODE, Header, Key, Results};
+use super::results::{Key, Results};
 use super::scenario::{PlantKind, Scenario};
 use super::seed;
 use super::variation::Variation;
@@ -185,10 +186,10 @@ impl Config {
         let variation = self.variation.to_string();
         let mut described: BTreeMap<String, String> = [
             ("object", described(self.object)),
-            ("cells", cells.join(" ")),
+            (CELLS, cells.join(" ")),
             ("engine", engine),
             ("plant", self.plant.name().to_owned()),
-            ("variation", if variation.is_empty() { "none".to_owned() } else { variation }),
+            ("variation", if variation.is_empty() { NO_VARIATION.to_owned() } else { variation }),
             ("primitive", format!("{} 0x{:08x}", self.primitive.name, self.primitive.checksum())),
             ("goal", format!("{:.4} {:.4}", frame.goal[0], frame.goal[1])),
             ("model", format!("0x{:08x}", control::MODEL_HASH)),

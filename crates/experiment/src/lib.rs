@@ -17,10 +17,12 @@ pub mod figures;
 #[cfg(test)]
 pub mod fixtures;
 pub mod grid;
+pub mod header;
 pub mod interval;
 pub mod inverse;
 #[cfg(feature = "mujoco")]
 pub mod lift;
+pub mod log;
 pub mod map;
 pub mod observation;
 #[cfg(feature = "mujoco")]

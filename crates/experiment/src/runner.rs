@@ -6,8 +6,10 @@ use std::sync::{Mutex, PoisonError, mpsc};
 
 use super::config::Config;
 use super::grid::Cell;
+use super::header::CODE;
+use super::log::{Log, ResultsError};
 use super::reach;
-use super::results::{CODE, Key, Log, Report, Results, ResultsError};
+use super::results::{Key, Report, Results};
 use super::statistics::Summary;
 use super::trial::{self, Prepared, Trial, TrialError};
 use lab::client::Interrupt;

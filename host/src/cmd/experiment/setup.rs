@@ -1,0 +1,207 @@
+//! The configuration of an experiment from the options of the command, with a primitive that is made if there is none.
+
+use std::path::{Path, PathBuf};
+
+use super::failures::preparation_failure;
+use super::refusal::{DOING, REFUSED};
+use super::{Cmd, ErrorCode, Failure, Global};
+use crate::cmd::{Output, connection, files, upload};
+use experiment::log::Log;
+use experiment::preparation::{self, PreparationError, Teaching};
+use experiment::{Config, Mode, PlantKind};
+use lab::client::Interrupt;
+use lab::primitive_file::PrimitiveFile;
+use lab::simulation::{Engine, SimulationOptions};
+use lab::transport::Address;
+use sim::world::ObjectKind;
+
+/// Where the device is simulated unless said otherwise.
+const DEVICE: &str = "sil:";
+
+/// The experiment as asked for, with the primitive of the demonstration `number`; results go into `out`.
+pub(super) fn configuration(
+    command: &Cmd,
+    global: &Global,
+    out: &Path,
+    number: u64,
+    interrupt: &Interrupt,
+    output: Output,
+) -> Result<Config, Failure> {
+    let engine = engine(global)?;
+    let object = command.object.as_deref().map(object).transpose()?;
+    if command.figures_only && !out.is_dir() {
+        let cause = format!("there are no results in {}", out.display());
+        return Err(Failure::new(ErrorCode::NoResults, REFUSED, cause));
+    }
+    let primitive = primitive(command, command.plant, out, number, interrupt, output)?;
+    let usual = Config::new(command.scenario, primitive);
+    let grid = command.grid.clone().unwrap_or_else(|| usual.grid.clone());
+    let config = Config {
+        object: object.unwrap_or(usual.object),
+        grid: grid.moved(command.rotate, command.shift.map(|value| value * 0.01)),
+        // Figures are of everything that is there, unless a part of it is named.
+        modes: modes(command).unwrap_or(if command.figures_only { Vec::new() } else { usual.modes }),
+        seeds: seeds(command),
+        engine,
+        plant: command.plant,
+        variation: command.vary,
+        jobs: command.jobs.map_or(usual.jobs, usize::from),
+        out: Some(out.to_owned()),
+        resume: command.resume,
+        as_it_is: command.figures_only,
+        keep_traces: true,
+        keep_recordings: command.keep_recordings,
+        ..usual
+    };
+    if let (Some(_), false) = (&command.primitive, command.figures_only) {
+        keep(&config.primitive, &file(command, out), out)?;
+    }
+    Ok(config)
+}
+
+/// File of the primitive that is tried in a folder.
+fn file(command: &Cmd, out: &Path) -> PathBuf {
+    out.join(format!("{}.toml", command.scenario))
+}
+
+/// Puts the primitive into the folder, which tells by itself what was tried in it.
+fn keep(primitive: &PrimitiveFile, file: &Path, out: &Path) -> Result<(), Failure> {
+    files::create_folder(out, DOING)?;
+    if file.exists() {
+        return Ok(());
+    }
+    primitive.write(file).map_err(|error| preparation_failure(error.into()))
+}
+
+/// The object that is compiled in under this name, or that of the user's file.
+fn object(given: &Path) -> Result<ObjectKind, Failure> {
+    if let Some(Ok(kind)) = given.to_str().map(str::parse) {
+        return Ok(kind);
+    }
+    if given.extension().is_none_or(|extension| extension != "toml") {
+        let known = ObjectKind::ALL.map(ObjectKind::name).join(", ");
+        let cause = format!("there is no object '{}'; there are {known}, and files NAME.toml", given.display());
+        return Err(Failure::new(ErrorCode::UnknownObject, DOING, cause));
+    }
+    let text = lab::input_file::read_text(given)
+        .map_err(|cause| Failure::of_file(ErrorCode::FileFailed, format!("{DOING}: {}", given.display()), cause))?;
+    ObjectKind::from_toml(&text)
+        .map_err(|cause| Failure::new(ErrorCode::ObjectInvalid, format!("{DOING} refused {}", given.display()), cause))
+}
+
+/// The arms that are asked for.
+fn seeds(command: &Cmd) -> Vec<u64> {
+    match (command.seed, &command.seeds) {
+        (Some(seed), _) => vec![seed],
+        (None, Some(seeds)) => seeds.clone().collect(),
+        (None, None) if command.figures_only => Vec::new(),
+        (None, None) => vec![1],
+    }
+}
+
+/// The modes that are asked for, if any are.
+fn modes(command: &Cmd) -> Option<Vec<Mode>> {
+    let mut modes = command.modes.clone();
+    modes.sort_unstable();
+    modes.dedup();
+    Some(modes).filter(|modes| !modes.is_empty())
+}
+
+fn engine(global: &Global) -> Result<Engine, Failure> {
+    let text = global.device.as_deref().unwrap_or(DEVICE);
+    let address = match global.address(DOING)? {
+        Some(address) => address,
+        None => DEVICE.parse().map_err(|error| lab::error::HostError::Address(error).into_failure(DOING))?,
+    };
+    let Address::Simulated(kind, options) = address else {
+        return Err(Failure::new(ErrorCode::NotSimulated, DOING, format!("'{text}' is not a simulated device"))
+            .help("`--device sil:`, or `--device sim:` for the firmware under QEMU, or `--device board:` for it on the emulated board"));
+    };
+    let options = SimulationOptions::from_address(kind, &options)
+        .map_err(|error| connection::simulation_failure(error, DOING))?;
+    Ok(options.engine)
+}
+
+/// The primitive that is given, the one that was made here before, or a new one.
+fn primitive(
+    command: &Cmd,
+    plant: PlantKind,
+    out: &Path,
+    number: u64,
+    interrupt: &Interrupt,
+    output: Output,
+) -> Result<PrimitiveFile, Failure> {
+    let file = file(command, out);
+    if let Some(given) = &command.primitive {
+        let primitive = upload::read(given, DOING)?;
+        return Ok(primitive);
+    }
+    if file.is_file() {
+        output.say(format!("the primitive is {}", file.display()));
+        let primitive = upload::read(&file, DOING)?;
+        if primitive.statistics.is_some() || command.figures_only || Log::is_begun(out) {
+            return Ok(primitive);
+        }
+        // Somebody broke off while they were gathered. Without them nothing watches the trials, and none is told.
+        let spinner = output.spinner("recording successful runs");
+        let watched = with_statistics(command, plant, primitive, &file, interrupt, output);
+        spinner.finish_and_clear();
+        return watched.map_err(preparation_failure);
+    }
+    if command.figures_only {
+        let cause = format!("{} is not there", file.display());
+        return Err(Failure::new(ErrorCode::NoResults, REFUSED, cause)
+            .help("name the primitive that was tried with `--primitive`, or the folder with `--out`"));
+    }
+    // A folder that cannot be had is told before the minutes of teaching.
+    files::create_folder(out, DOING)?;
+    let teaching = Teaching { scenario: command.scenario, plant, speed: command.learn_speed, number };
+    let made = taught(command, teaching, &file, interrupt, output);
+    let primitive = made.map_err(preparation_failure)?;
+    output.say(format!("taught, learned and rehearsed: {}", file.display()));
+    Ok(primitive)
+}
+
+/// A new primitive, written into `file`.
+fn taught(
+    command: &Cmd,
+    teaching: Teaching,
+    file: &Path,
+    interrupt: &Interrupt,
+    output: Output,
+) -> Result<PrimitiveFile, PreparationError> {
+    let spinner = output.spinner("teaching");
+    let jobs = command.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from);
+    let made = preparation::make(teaching, file, jobs, interrupt, &mut |doing| {
+        spinner.set_message(doing.to_owned());
+    })
+    .and_then(|primitive| {
+        // Whatever becomes of the statistics, the primitive is worth keeping.
+        primitive.write(file)?;
+        spinner.set_message("recording successful runs");
+        with_statistics(command, teaching.plant, primitive, file, interrupt, output)
+    });
+    spinner.finish_and_clear();
+    made
+}
+
+/// The primitive with the statistics of successful runs, written into its file.
+fn with_statistics(
+    command: &Cmd,
+    plant: PlantKind,
+    mut primitive: PrimitiveFile,
+    file: &Path,
+    interrupt: &Interrupt,
+    output: Output,
+) -> Result<PrimitiveFile, PreparationError> {
+    let usual = Config::new(command.scenario, primitive.clone());
+    let jobs = command.jobs.map_or(usual.jobs, usize::from);
+    let config = Config { plant, jobs, ..usual };
+    let (held, of) = preparation::statistics(&config, interrupt, &mut primitive)?;
+    output.say(match primitive.statistics {
+        Some(_) => format!("{held} of {of} runs succeeded; what is usual was learned from them"),
+        None => format!("{held} of {of} runs succeeded: too few to learn what is usual, and nothing is watched"),
+    });
+    primitive.write(file)?;
+    Ok(primitive)
+}
