@@ -121,6 +121,19 @@ impl Grid {
         rows
     }
 
+    /// The grid as the option `--grid` takes it, short where it has a name.
+    #[must_use]
+    pub fn option(&self) -> String {
+        let (columns, rows) = (self.columns().len(), self.rows().len());
+        if *self == Grid::paper() {
+            return "paper".to_owned();
+        }
+        if Grid::spread(columns, rows).as_ref() == Ok(self) {
+            return format!("{columns}x{rows}");
+        }
+        self.cells.iter().map(Cell::to_string).collect::<Vec<_>>().join(",")
+    }
+
     /// Turned about its middle and shifted: what a controller tuned to the cells of one grid would trip over.
     ///
     /// `degrees` counter-clockwise seen from above; `shift` along the approach and sideways, m.
@@ -284,6 +297,16 @@ mod tests {
             let old = format!("{}:{}", f64::from(cell.along_mm) * 0.1, f64::from(cell.sideways_mm) * 0.1);
             assert_eq!(old.parse(), Ok(cell));
         }
+    }
+
+    #[test]
+    fn the_option_of_a_grid_gives_it_back() {
+        for text in ["paper", "4x3", "2x1", "-2.9:13.7,0:0"] {
+            let grid: Grid = text.parse().unwrap();
+            assert_eq!(grid.option(), text);
+        }
+        let turned = Grid::paper().moved(30.0, [0.0, 0.0]);
+        assert_eq!(turned.option().parse(), Ok(turned));
     }
 
     #[test]

@@ -4,8 +4,11 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use sim::world::ObjectKind;
 
-use super::grid::Cell;
+use super::grid::{Cell, Grid};
+use super::scenario::PlantKind;
+use super::variation::Variation;
 
 /// Name of the hash of the code among the words of a header ([`Header::described`]).
 pub const CODE: &str = "code";
@@ -48,6 +51,21 @@ pub fn in_words(differences: &[Difference]) -> String {
     differences.iter().map(Difference::to_string).collect::<Vec<_>>().join(", ")
 }
 
+/// The parts of a configuration that options of the command decide, read back from a header.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Chosen {
+    /// The object; `None` of one that is not compiled in.
+    pub object: Option<ObjectKind>,
+    /// The cells, turned and shifted as they were tried.
+    pub grid: Option<Grid>,
+    /// The difference between plant and model.
+    pub plant: Option<PlantKind>,
+    /// Factors that differ from that plant.
+    pub variation: Option<Variation>,
+    /// The arms were weighed before.
+    pub weighed: bool,
+}
+
 impl Header {
     /// The parts by which the trials below this header are not those of `is`; nothing where they are.
     pub fn differences(&self, is: &Header) -> Vec<Difference> {
@@ -84,6 +102,22 @@ impl Header {
             || (name == CELLS
                 && was.zip(is).is_some_and(|(was, is)| cells(was).is_some_and(|was| cells(is) == Some(was))))
     }
+
+    /// The parts that options decide.
+    pub fn chosen(&self) -> Chosen {
+        let word = |name: &str| self.described.get(name).map(String::as_str);
+        let plants = [PlantKind::Perturbed, PlantKind::Ideal];
+        Chosen {
+            object: word("object").and_then(|name| name.parse().ok()),
+            grid: word(CELLS).and_then(cells).map(|cells| Grid { cells }),
+            plant: word("plant").and_then(|name| plants.into_iter().find(|plant| plant.name() == name)),
+            variation: word("variation").and_then(|text| match text {
+                NO_VARIATION => Some(Variation::default()),
+                text => text.parse().ok(),
+            }),
+            weighed: word("arms").is_some(),
+        }
+    }
 }
 
 /// The cells that a header lists.
@@ -98,6 +132,26 @@ mod tests {
     fn header(words: &[(&str, &str)]) -> Header {
         let described = words.iter().map(|(name, word)| ((*name).to_owned(), (*word).to_owned())).collect();
         Header { experiment: "flashlight".to_owned(), configuration: format!("{words:?}"), described }
+    }
+
+    /// The change that makes it fail: options of the command that the words do not give back, so that whoever wants
+    /// figures has to repeat them.
+    #[test]
+    fn what_was_chosen_is_read_back_from_the_words() {
+        let chosen = header(&[
+            ("object", "cup"),
+            ("cells", "-24:8 0.1:-2.9"),
+            ("plant", "ideal"),
+            ("variation", "mass=1.3,delay=1"),
+            ("arms", "weighed"),
+        ])
+        .chosen();
+        assert_eq!((chosen.object, chosen.plant), (Some(ObjectKind::Cup), Some(PlantKind::Ideal)));
+        assert_eq!(chosen.grid, Some("-24:8,0.1:-2.9".parse().unwrap()));
+        assert_eq!(chosen.variation, Some("mass=1.3,delay=1".parse().unwrap()));
+        assert!(chosen.weighed);
+        let usual = header(&[("object", "mug 0x12345678"), ("variation", "none")]).chosen();
+        assert_eq!((usual.object, usual.variation, usual.weighed), (None, Some(Variation::default()), false));
     }
 
     /// The change that makes it fail: the hash alone, which is of the words as they were written.

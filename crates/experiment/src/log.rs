@@ -91,6 +91,20 @@ impl Log {
         within.chain([folder.to_owned()]).any(|folder| folder.join(LINES).is_file())
     }
 
+    /// The header of the results in `folder`, or of those in the first one within it; `None` where there are none.
+    ///
+    /// # Errors
+    /// [`ResultsError`]
+    pub fn header(folder: &Path) -> Result<Option<Header>, ResultsError> {
+        let within = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        let mut within: Vec<PathBuf> = within.collect();
+        within.sort();
+        let files = [folder.to_owned()].into_iter().chain(within).map(|folder| folder.join(LINES));
+        let Some(path) = files.into_iter().find(|file| file.is_file()) else { return Ok(None) };
+        let file = File::open(&path).map_err(|cause| ResultsError::File { file: path.clone(), cause })?;
+        Lines::new(&path, &file).line()
+    }
+
     /// Opens the file in `folder`; gives what it holds if `resume` allows that.
     ///
     /// A last line that broke off when the program was ended is cut away: that trial is tried again.

@@ -59,9 +59,9 @@ pub struct Cmd {
     /// Learn the movement this many times as fast as it is shown; the fingers keep their time
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = values::faster, conflicts_with = "primitive")]
     pub learn_speed: f64,
-    /// Difference between the simulated arm and the controller's model
-    #[arg(long, value_enum, default_value = "perturbed")]
-    pub plant: PlantKind,
+    /// Difference between the simulated arm and the controller's model [default: perturbed]
+    #[arg(long, value_enum)]
+    pub plant: Option<PlantKind>,
     /// Factors that differ from that arm: mass, table-friction, finger-friction, joint-friction, link-mass, noise
     /// (factors), delay (cycles), bias (N, comes up after the run's tare), speed (of the run, of the taught one)
     #[arg(long, value_name = "NAME=VALUE,...", default_value = "")]
@@ -83,8 +83,8 @@ pub struct Cmd {
     /// Go on with the results in the folder
     #[arg(long)]
     pub resume: bool,
-    /// Make figures and tables of the results in the folder, without trials: of all modes and seeds that are there,
-    /// unless some are named
+    /// Make figures and tables of the results in the folder, without trials: of their grid and configuration, and of
+    /// all modes and seeds that are there unless some are named
     #[arg(long, conflicts_with = "resume")]
     pub figures_only: bool,
     /// Render frames of one trial in each mode

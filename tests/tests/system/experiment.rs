@@ -1,6 +1,6 @@
 //! `tactus experiment` refuses what it cannot do before it teaches or writes anything.
 
-use system_tests::command::{stderr, tactus};
+use system_tests::command::{stderr, stdout, tactus};
 use system_tests::{expect, taught};
 
 #[test]
@@ -33,4 +33,22 @@ fn an_object_that_is_none_is_refused_before_anything_is_taught_or_written() {
         assert!(failed.contains(&format!("error[{code}]")) && failed.contains(reason), "{failed}");
         assert!(!folder.join("results").exists(), "{object}");
     }
+}
+
+/// The changes that make it fail: figures of the usual grid and plant whatever the results are of, and advice to remove
+/// them.
+#[test]
+fn figures_need_no_options_again_and_who_forgets_them_to_go_on_is_told_them() {
+    let folder = expect(tempfile::tempdir());
+    let folder = folder.path();
+    expect(taught().write(&folder.join("primitive.toml")));
+    let run = |line: &str| tactus(folder, &line.split(' ').collect::<Vec<_>>());
+    let begun = "experiment flashlight --modes a --out out --grid -4:0,0:0 --plant ideal --vary mass=1.1";
+    run(&format!("{begun} --primitive primitive.toml")).success();
+    let figures = stdout(&run("experiment flashlight --out out --figures-only").success());
+    assert!(figures.contains("(a) ") && figures.contains("/2"), "{figures}");
+    let failed = stderr(&run("experiment flashlight --modes a --out out --resume").failure().code(4));
+    assert!(failed.contains("give `--grid -4:0,0:0 --plant ideal --vary mass=1.1`"), "{failed}");
+    assert!(failed.contains("error[E404]") && !failed.contains("remove"), "{failed}");
+    run(&format!("{begun} --resume")).success();
 }

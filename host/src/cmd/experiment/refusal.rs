@@ -1,8 +1,11 @@
-//! Results that an experiment cannot go on with.
+//! Results that an experiment cannot go on with, and the options with which it could.
 
 use std::io::ErrorKind;
 
+use experiment::header::Difference;
 use experiment::log::ResultsError;
+use experiment::{Cell, Grid, Scenario};
+use sim::world::ObjectKind;
 
 use super::{Cmd, ErrorCode, Failure};
 
@@ -11,11 +14,23 @@ pub(super) const DOING: &str = "experiment";
 /// The same where it did not begin.
 pub(super) const REFUSED: &str = "experiment refused";
 
+/// Advice that loses nothing, where nothing better is known.
+const ELSEWHERE: &str = "choose another folder with `--out`";
+
+/// A change of the command line.
+enum Change {
+    Give(String),
+    LeaveOut(&'static str),
+}
+
 /// The failure of the results in the folder that this command named.
-pub(super) fn of(error: ResultsError, _command: &Cmd) -> Failure {
+pub(super) fn of(error: ResultsError, command: &Cmd) -> Failure {
     match &error {
         ResultsError::Exists { .. } => Failure::new(ErrorCode::ResultsExist, REFUSED, error),
-        ResultsError::OtherConfiguration { .. } => Failure::new(ErrorCode::OtherExperiment, REFUSED, error),
+        ResultsError::OtherConfiguration { differences, .. } => {
+            let advice = advice(command, differences);
+            Failure::new(ErrorCode::OtherExperiment, REFUSED, error).help(advice)
+        }
         ResultsError::None { .. } => Failure::new(ErrorCode::NoResults, REFUSED, error),
         ResultsError::Line { .. } => Failure::new(ErrorCode::ResultsDamaged, REFUSED, error),
         ResultsError::Place(place) => {
@@ -29,6 +44,85 @@ pub(super) fn of(error: ResultsError, _command: &Cmd) -> Failure {
             }
             _ => Failure::of_file(ErrorCode::ResultsNotWritten, DOING, error),
         },
+    }
+}
+
+/// The change of the command line after which it is one for the results that are there; another folder where there is
+/// none. Nothing is ever to be removed: results may have taken days.
+fn advice(command: &Cmd, differences: &[Difference]) -> String {
+    if differences.iter().all(|difference| difference.name == experiment::header::CODE) {
+        return format!("{ELSEWHERE}; `--figures-only` draws the results that are there");
+    }
+    let changes: Option<Vec<Vec<Change>>> = differences.iter().map(|difference| changes(command, difference)).collect();
+    let changes: Vec<Change> = changes.unwrap_or_default().into_iter().flatten().collect();
+    let (mut given, mut left_out) = (Vec::new(), Vec::new());
+    for change in &changes {
+        match change {
+            Change::Give(option) => given.push(option.as_str()),
+            Change::LeaveOut(option) => left_out.push(format!("`{option}`")),
+        }
+    }
+    let (given, left_out) = (given.join(" "), left_out.join(", "));
+    match (given.is_empty(), left_out.is_empty()) {
+        (true, true) => ELSEWHERE.to_owned(),
+        (false, true) => format!("give `{given}`, as for these results; or {ELSEWHERE}"),
+        (true, false) => format!("leave out {left_out}, as for these results; or {ELSEWHERE}"),
+        (false, false) => format!("give `{given}` and leave out {left_out}, as for these results; or {ELSEWHERE}"),
+    }
+}
+
+/// The changes that undo one difference; `None` if no option does.
+fn changes(command: &Cmd, Difference { name, was, is }: &Difference) -> Option<Vec<Change>> {
+    let give = |option: &str| Some(vec![Change::Give(format!("{option} {was}"))]);
+    let leave_out = |option| Some(vec![Change::LeaveOut(option)]);
+    // The results say by themselves what figures are of: a difference is one that was asked for.
+    let is_asked = command.figures_only;
+    match name.as_str() {
+        "cells" => cells(command, was),
+        "object" if is_asked && command.object.is_some() => leave_out("--object"),
+        "object" if *was == *command.scenario.object().name() => leave_out("--object"),
+        "object" if was.parse::<ObjectKind>().is_ok() => give("--object"),
+        "object" => Some(vec![Change::Give("--object FILE".to_owned())]),
+        "plant" if is_asked => leave_out("--plant"),
+        "plant" => give("--plant"),
+        // Cases and sweeps vary by themselves.
+        "variation" if command.scenario == Scenario::Lift || command.sweep.is_some() => None,
+        "variation" if is_asked || was == experiment::header::NO_VARIATION => leave_out("--vary"),
+        "variation" => give("--vary"),
+        "arms" if was == "weighed" => Some(vec![Change::Give("--calibrated".to_owned())]),
+        "arms" => leave_out("--calibrated"),
+        "engine" => {
+            let device = device(was)?;
+            (Some(device) != self::device(is)).then(|| vec![Change::Give(format!("--device {device}"))])
+        }
+        _ => None,
+    }
+}
+
+/// The changes after which the cells are these.
+fn cells(command: &Cmd, words: &str) -> Option<Vec<Change>> {
+    let cells: Vec<Cell> = words.split(' ').map(|cell| cell.parse().ok()).collect::<Option<_>>()?;
+    let grid = Grid { cells };
+    let mut changes = Vec::new();
+    if command.figures_only || grid == command.scenario.grid() {
+        if command.grid.is_some() {
+            changes.push(Change::LeaveOut("--grid"));
+        }
+    } else {
+        changes.push(Change::Give(format!("--grid {}", grid.option())));
+    }
+    let moves = [(command.rotate != 0.0, "--rotate"), (command.shift != [0.0; 2], "--shift")];
+    changes.extend(moves.into_iter().filter(|(is_given, _)| *is_given).map(|(_, option)| Change::LeaveOut(option)));
+    Some(changes)
+}
+
+/// The device whose engine a header describes in these words.
+fn device(engine: &str) -> Option<&'static str> {
+    match engine {
+        "in this process" => Some("sil:"),
+        under if under.ends_with("under QEMU") => Some("sim:"),
+        on if on.ends_with("on the emulated board") => Some("board:"),
+        _ => None,
     }
 }
 
@@ -46,6 +140,49 @@ mod tests {
 
     fn command(line: &str) -> Cmd {
         Line::try_parse_from(["experiment"].into_iter().chain(line.split_whitespace())).unwrap().command
+    }
+
+    fn told(line: &str, differences: &[(&str, &str, &str)]) -> String {
+        let command = command(line);
+        let difference = |(name, was, is): &(&str, &str, &str)| Difference {
+            name: (*name).to_owned(),
+            was: (*was).to_owned(),
+            is: (*is).to_owned(),
+        };
+        advice(&command, &differences.iter().map(difference).collect::<Vec<_>>())
+    }
+
+    /// The change that makes it fail: advice to remove the folder, with its results and the primitive that was taught.
+    #[test]
+    fn whoever_forgets_an_option_is_told_it_and_nothing_is_to_be_removed() {
+        let all = "-24:8 -20:8";
+        for (line, differences, words) in [
+            ("flashlight --resume", &[("cells", "-24:0 4:0", all)][..], "give `--grid 2x1`, as"),
+            ("cup --resume", &[("cells", "-2.9:13.7 0:0", all)], "give `--grid -2.9:13.7,0:0`, as"),
+            (
+                "flashlight --resume --rotate 30",
+                &[("cells", "-24:0 4:0", all), ("plant", "ideal", "perturbed")],
+                "give `--grid 2x1 --plant ideal` and leave out `--rotate`, as",
+            ),
+            ("lift --grid 0:4 --resume", &[("cells", "0:0", "0:4")], "leave out `--grid`, as"),
+            ("cup --resume", &[("variation", "mass=1.3", "none")], "give `--vary mass=1.3`, as"),
+            ("cup --resume --vary mass=2", &[("variation", "none", "mass=2")], "leave out `--vary`, as"),
+            ("cup --resume", &[("object", "weight", "cup")], "give `--object weight`, as"),
+            ("cup --resume", &[("object", "mug 0x12345678", "cup")], "give `--object FILE`, as"),
+            ("cup --resume", &[("arms", "weighed", "-")], "give `--calibrated`, as"),
+            ("cup --resume", &[("engine", "firmware 0x1 under QEMU", "in this process")], "give `--device sim:`, as"),
+            ("cup --figures-only --plant ideal", &[("plant", "perturbed", "ideal")], "leave out `--plant`, as"),
+            ("cup --figures-only --grid 4x3", &[("cells", "0:0", all)], "leave out `--grid`, as"),
+            ("cup --resume", &[("code", "0x1", "0x2")], "`--figures-only` draws"),
+        ] {
+            let advice = told(line, differences);
+            assert!(advice.contains(words) && advice.contains("`--out`"), "{line}: {advice}");
+            assert!(!advice.contains("remove"), "{advice}");
+        }
+        for name in ["primitive", "model", "program", "the experiment"] {
+            let other = [("cells", "0:0", all), (name, "a", "b")];
+            assert_eq!(told("cup --resume", &other), ELSEWHERE, "{name}");
+        }
     }
 
     /// The change that makes it fail: one code for all, E124, which is that of a defect.

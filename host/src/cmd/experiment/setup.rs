@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use super::failures::preparation_failure;
-use super::refusal::{DOING, REFUSED};
+use super::refusal::{self, DOING, REFUSED};
 use super::{Cmd, ErrorCode, Failure, Global};
 use crate::cmd::{Output, connection, files, upload};
+use experiment::header::Chosen;
+use experiment::lift::Case;
 use experiment::log::Log;
 use experiment::preparation::{self, PreparationError, Teaching};
-use experiment::{Config, Mode, PlantKind};
+use experiment::{Config, Grid, Mode, PlantKind, Scenario, Variation};
 use lab::client::Interrupt;
 use lab::primitive_file::PrimitiveFile;
 use lab::simulation::{Engine, SimulationOptions};
@@ -33,18 +35,21 @@ pub(super) fn configuration(
         let cause = format!("there are no results in {}", out.display());
         return Err(Failure::new(ErrorCode::NoResults, REFUSED, cause));
     }
-    let primitive = primitive(command, command.plant, out, number, interrupt, output)?;
+    let chosen = chosen(command, out)?;
+    let object = object.or(chosen.object).unwrap_or_else(|| command.scenario.object());
+    let grid = grid(command, chosen.grid);
+    let plant = plant(command, chosen.plant);
+    let primitive = primitive(command, plant, out, number, interrupt, output)?;
     let usual = Config::new(command.scenario, primitive);
-    let grid = command.grid.clone().unwrap_or_else(|| usual.grid.clone());
     let config = Config {
-        object: object.unwrap_or(usual.object),
-        grid: grid.moved(command.rotate, command.shift.map(|value| value * 0.01)),
+        object,
+        grid,
         // Figures are of everything that is there, unless a part of it is named.
         modes: modes(command).unwrap_or(if command.figures_only { Vec::new() } else { usual.modes }),
         seeds: seeds(command),
         engine,
-        plant: command.plant,
-        variation: command.vary,
+        plant,
+        variation: chosen.variation.filter(|_| command.vary == Variation::default()).unwrap_or(command.vary),
         jobs: command.jobs.map_or(usual.jobs, usize::from),
         out: Some(out.to_owned()),
         resume: command.resume,
@@ -57,6 +62,35 @@ pub(super) fn configuration(
         keep(&config.primitive, &file(command, out), out)?;
     }
     Ok(config)
+}
+
+/// The configuration of the results that are there, of which figures are asked for; of other experiments, nothing.
+pub(super) fn chosen(command: &Cmd, out: &Path) -> Result<Chosen, Failure> {
+    if !command.figures_only {
+        return Ok(Chosen::default());
+    }
+    // Of the three cases the one whose weight is that of the experiment.
+    let folder = if command.scenario == Scenario::Lift { out.join(Case::Usual.name()) } else { out.to_owned() };
+    let header = Log::header(&folder).map_err(|error| refusal::of(error, command))?;
+    let header = header.filter(|header| header.experiment == command.scenario.name());
+    Ok(header.map(|header| header.chosen()).unwrap_or_default())
+}
+
+/// The cells that are asked for, else those that are there.
+fn grid(command: &Cmd, there: Option<Grid>) -> Grid {
+    let moves = command.rotate != 0.0 || command.shift != [0.0; 2];
+    match (&command.grid, there) {
+        (None, Some(there)) if !moves => there,
+        (given, _) => {
+            let grid = given.clone().unwrap_or_else(|| command.scenario.grid());
+            grid.moved(command.rotate, command.shift.map(|value| value * 0.01))
+        }
+    }
+}
+
+/// The plant that is asked for, else that of what is there.
+fn plant(command: &Cmd, there: Option<PlantKind>) -> PlantKind {
+    command.plant.or(there).unwrap_or(PlantKind::Perturbed)
 }
 
 /// File of the primitive that is tried in a folder.

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::failures::{failure, preparation_failure, trial_failure, unwritable};
 use super::refusal::DOING;
-use super::setup::configuration;
+use super::setup::{chosen, configuration};
 use super::{Cmd, ErrorCode, Failure, Global, Lifted, Studied, Tried};
 use crate::cmd::{Output, connection, files, upload};
 use control::model::WeightCorrection;
@@ -25,7 +25,7 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         return study(command, global, &out, &interrupt, output);
     }
     let mut config = configuration(command, global, &out, 1, &interrupt, output)?;
-    if command.calibrated {
+    if command.calibrated || chosen(command, &out)?.weighed {
         config.weights = calibrate(&config, &out, &interrupt, output)?;
     }
     if config.scenario == Scenario::Lift {
