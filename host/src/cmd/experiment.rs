@@ -1,5 +1,7 @@
 //! `tactus experiment`: the same movement on objects that are not where it expects them.
 
+#[cfg(any(feature = "mujoco", test))]
+mod device;
 #[cfg(feature = "mujoco")]
 mod failures;
 #[cfg(any(feature = "mujoco", test))]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::failures::preparation_failure;
 use super::refusal::{self, DOING, REFUSED};
-use super::{Cmd, ErrorCode, Failure, Global};
+use super::{Cmd, ErrorCode, Failure, Global, device};
 use crate::cmd::{Output, connection, files, upload};
 use experiment::header::Chosen;
 use experiment::lift::Case;
@@ -151,6 +151,13 @@ fn engine(global: &Global) -> Result<Engine, Failure> {
         return Err(Failure::new(ErrorCode::NotSimulated, DOING, format!("'{text}' is not a simulated device"))
             .help("`--device sil:`, or `--device sim:` for the firmware under QEMU, or `--device board:` for it on the emulated board"));
     };
+    let ignored = device::ignored(kind, &options);
+    if !ignored.is_empty() {
+        let options: Vec<String> = ignored.iter().map(|(option, _)| format!("`{option}`")).collect();
+        let help: Vec<String> = ignored.iter().map(|(option, help)| format!("{option}: {help}")).collect();
+        let cause = format!("'{text}': an experiment does not heed {}", options.join(", "));
+        return Err(Failure::new(ErrorCode::AddressInvalid, REFUSED, cause).help(help.join("; ")));
+    }
     let options = SimulationOptions::from_address(kind, &options)
         .map_err(|error| connection::simulation_failure(error, DOING))?;
     Ok(options.engine)
