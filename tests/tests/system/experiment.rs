@@ -35,6 +35,24 @@ fn an_object_that_is_none_is_refused_before_anything_is_taught_or_written() {
     }
 }
 
+/// The change that makes it fail: a primitive that is written into the folder where none is, and otherwise tried
+/// under the name of the one that is there.
+#[test]
+fn a_primitive_is_not_tried_in_the_folder_of_another_one() {
+    let folder = expect(tempfile::tempdir());
+    let folder = folder.path();
+    expect(taught().write(&folder.join("primitive.toml")));
+    expect(std::fs::create_dir(folder.join("out")));
+    for other in ["", "something of somebody else"] {
+        expect(std::fs::write(folder.join("out/cup.toml"), other));
+        let line = "experiment cup --grid 0:0 --modes a --primitive primitive.toml --out out";
+        let failed = stderr(&tactus(folder, &line.split(' ').collect::<Vec<_>>()).failure().code(2));
+        assert!(failed.contains("error[E230]") && failed.contains("is another primitive"), "{failed}");
+        assert_eq!(expect(std::fs::read_to_string(folder.join("out/cup.toml"))), other);
+        assert!(!folder.join("out/results.jsonl").exists());
+    }
+}
+
 /// The changes that make it fail: figures of the usual grid and plant whatever the results are of, and advice to remove
 /// them.
 #[test]

@@ -107,6 +107,16 @@ fn keep(primitive: &PrimitiveFile, file: &Path, out: &Path) -> Result<(), Failur
     primitive.write(file).map_err(|error| preparation_failure(error.into()))
 }
 
+/// Refuses a primitive that is not the one in the folder: results of two would lie there under the name of one.
+fn must_be_the_one_there(primitive: &PrimitiveFile, file: &Path) -> Result<(), Failure> {
+    if !file.exists() || PrimitiveFile::read(file).is_ok_and(|there| there.checksum() == primitive.checksum()) {
+        return Ok(());
+    }
+    let cause = format!("{} is another primitive than {}", file.display(), primitive.file.display());
+    Err(Failure::new(ErrorCode::WouldReplace, REFUSED, cause)
+        .help("choose another folder with `--out`; without `--primitive` the one in the folder is tried"))
+}
+
 /// The object that is compiled in under this name, or that of the user's file.
 fn object(given: &Path) -> Result<ObjectKind, Failure> {
     if let Some(Ok(kind)) = given.to_str().map(str::parse) {
@@ -175,6 +185,7 @@ fn primitive(
     let file = file(command, out);
     if let Some(given) = &command.primitive {
         let primitive = upload::read(given, DOING)?;
+        must_be_the_one_there(&primitive, &file)?;
         return Ok(primitive);
     }
     if file.is_file() {
