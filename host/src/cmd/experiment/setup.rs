@@ -58,6 +58,7 @@ pub(super) fn configuration(
         keep_recordings: command.keep_recordings,
         ..usual
     };
+    must_expect_forces(&config)?;
     if let (Some(_), false) = (&command.primitive, command.figures_only) {
         keep(&config.primitive, &file(command, out), out)?;
     }
@@ -91,6 +92,20 @@ fn grid(command: &Cmd, there: Option<Grid>) -> Grid {
 /// The plant that is asked for, else that of what is there.
 fn plant(command: &Cmd, there: Option<PlantKind>) -> PlantKind {
     command.plant.or(there).unwrap_or(PlantKind::Perturbed)
+}
+
+/// Refuses modes that compare forces with an expectation that the primitive does not have. The movement with a weight
+/// is rehearsed for each case.
+fn must_expect_forces(config: &Config) -> Result<(), Failure> {
+    let mode = config.modes.iter().find(|mode| mode.needs_expectation());
+    let Some(mode) = mode.filter(|_| config.primitive.expectation.is_none() && config.scenario != Scenario::Lift)
+    else {
+        return Ok(());
+    };
+    let file = config.primitive.file.display();
+    let cause = format!("{file}: the primitive has no expected forces");
+    Err(Failure::new(ErrorCode::NoExpectation, format!("{REFUSED}: mode {mode}"), cause)
+        .help(format!("`tactus rehearse {file}`, or `--modes a` alone")))
 }
 
 /// File of the primitive that is tried in a folder.
