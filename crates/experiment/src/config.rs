@@ -113,19 +113,8 @@ impl Config {
     ///
     /// `None` for a primitive that cannot be played.
     pub fn frame(&self) -> Option<ApproachFrame> {
-        let [x, y, _] = self.primitive.goal.position;
-        let [w, a, b, c] = self.primitive.goal.orientation;
-        // The third column of the rotation matrix.
-        let axis = [2.0 * (a * c + w * b), 2.0 * (b * c - w * a)];
-        let direction = if axis[0].hypot(axis[1]) > 0.5 {
-            axis
-        } else {
-            let start = self.primitive.start.position;
-            [x - start[0], y - start[1]]
-        };
-        // The object's place in the demonstration: the grasp point need not end in its axis.
-        let short = self.scenario.taught_movement().short_of_object() / direction[0].hypot(direction[1]);
-        ApproachFrame::new([x + short * direction[0], y + short * direction[1]], direction)
+        let goal = &self.primitive.goal;
+        frame(self.scenario, self.primitive.start.position, goal.position, goal.orientation)
     }
 
     /// The object in a cell.
@@ -212,6 +201,21 @@ impl Config {
     pub fn trial_seed(&self, key: &Key) -> u64 {
         seed::of_trial(key.seed, key.cell)
     }
+}
+
+/// The frame of an approach from `start` to `goal` with the hand turned as `orientation` says ([`Config::frame`]).
+pub(super) fn frame(
+    scenario: Scenario,
+    start: [f64; 3],
+    [x, y, _]: [f64; 3],
+    [w, a, b, c]: [f64; 4],
+) -> Option<ApproachFrame> {
+    // The third column of the rotation matrix.
+    let axis = [2.0 * (a * c + w * b), 2.0 * (b * c - w * a)];
+    let direction = if axis[0].hypot(axis[1]) > 0.5 { axis } else { [x - start[0], y - start[1]] };
+    // The object's place in the demonstration: the grasp point need not end in its axis.
+    let short = scenario.taught_movement().short_of_object() / direction[0].hypot(direction[1]);
+    ApproachFrame::new([x + short * direction[0], y + short * direction[1]], direction)
 }
 
 /// The object by its name; that of a user's file by its figures too, which may change under one name.

@@ -108,6 +108,16 @@ impl Experiment {
     }
 }
 
+/// Makes what all trials share, and checks that every object can be reached; nothing is written.
+///
+/// # Errors
+/// [`ExperimentError::Primitive`] and [`ExperimentError::OutOfReach`]
+pub fn check(config: &Config) -> Result<Prepared, ExperimentError> {
+    let prepared = Prepared::of(config).map_err(ExperimentError::Primitive)?;
+    let cells = reach::check(config, &prepared.frame);
+    if cells.is_empty() { Ok(prepared) } else { Err(ExperimentError::OutOfReach(cells)) }
+}
+
 /// Carries an experiment through. The results do not depend on the number of jobs nor on the order in which trials end.
 ///
 /// # Errors
@@ -117,11 +127,7 @@ pub fn run(
     interrupt: &Interrupt,
     progress: &mut dyn FnMut(Progress<'_>),
 ) -> Result<Experiment, ExperimentError> {
-    let prepared = Prepared::of(config).map_err(ExperimentError::Primitive)?;
-    let cells = reach::check(config, &prepared.frame);
-    if !cells.is_empty() {
-        return Err(ExperimentError::OutOfReach(cells));
-    }
+    let prepared = check(config)?;
     if config.as_it_is {
         return of_what_is_there(config, prepared, interrupt, progress);
     }

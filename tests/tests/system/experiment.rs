@@ -35,6 +35,34 @@ fn an_object_that_is_none_is_refused_before_anything_is_taught_or_written() {
     }
 }
 
+/// The changes that make it fail: `setup::configuration` that takes its folder before it looks at what it is given, a
+/// grid that is looked at once a primitive was taught for it, and an address of which the engine alone is read.
+#[test]
+fn what_cannot_be_tried_is_refused_before_anything_is_taught_and_leaves_no_folder() {
+    let folder = expect(tempfile::tempdir());
+    let folder = folder.path();
+    expect(taught().write(&folder.join("primitive.toml")));
+    expect(std::fs::write(folder.join("file"), ""));
+    for (line, code, exit, reason) in [
+        ("--device sil:seed=7 experiment cup --out new", "E201", 2, "`--seed 7`"),
+        ("experiment cup --primitive none.toml --out new", "E233", 2, "none.toml"),
+        ("experiment cup --grid 99:99 --out new", "E660", 6, "99:99 (not on the table)"),
+        ("experiment cup --grid 99:99 --primitive primitive.toml --modes a --out new", "E660", 6, "99:99"),
+        (
+            "experiment cup --grid 0:0 --primitive primitive.toml --out new",
+            "E635",
+            6,
+            "`tactus rehearse primitive.toml`",
+        ),
+        ("experiment cup --grid 0:0 --primitive primitive.toml --modes a --out file", "E231", 2, "name a folder"),
+    ] {
+        let failed = tactus(folder, &line.split(' ').collect::<Vec<_>>());
+        let failed = stderr(&failed.failure().code(exit));
+        assert!(failed.contains(&format!("error[{code}]")) && failed.contains(reason), "{line}: {failed}");
+        assert!(!folder.join("new").exists(), "{line}");
+    }
+}
+
 /// The change that makes it fail: a primitive that is written into the folder where none is, and otherwise tried
 /// under the name of the one that is there.
 #[test]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::failures::preparation_failure;
+use super::failures::{failure, preparation_failure};
 use super::refusal::{self, DOING, REFUSED};
 use super::{Cmd, ErrorCode, Failure, Global, device};
 use crate::cmd::{Output, connection, files, upload};
@@ -10,7 +10,7 @@ use experiment::header::Chosen;
 use experiment::lift::Case;
 use experiment::log::Log;
 use experiment::preparation::{self, PreparationError, Teaching};
-use experiment::{Config, Grid, Mode, PlantKind, Scenario, Variation};
+use experiment::{Config, ExperimentError, Grid, Mode, PlantKind, Scenario, Variation};
 use lab::client::Interrupt;
 use lab::primitive_file::PrimitiveFile;
 use lab::simulation::{Engine, SimulationOptions};
@@ -20,7 +20,8 @@ use sim::world::ObjectKind;
 /// Where the device is simulated unless said otherwise.
 const DEVICE: &str = "sil:";
 
-/// The experiment as asked for, with the primitive of the demonstration `number`; results go into `out`.
+/// The experiment as asked for, with the primitive of the demonstration `number`; results go into `out`. What cannot be
+/// tried is refused before anything is taught or written.
 pub(super) fn configuration(
     command: &Cmd,
     global: &Global,
@@ -39,6 +40,12 @@ pub(super) fn configuration(
     let object = object.or(chosen.object).unwrap_or_else(|| command.scenario.object());
     let grid = grid(command, chosen.grid);
     let plant = plant(command, chosen.plant);
+    if command.primitive.is_none() && !command.figures_only {
+        let cells = experiment::reach::check_untaught(command.scenario, object, &grid);
+        if !cells.is_empty() {
+            return Err(failure(ExperimentError::OutOfReach(cells), command));
+        }
+    }
     let primitive = primitive(command, plant, out, number, interrupt, output)?;
     let usual = Config::new(command.scenario, primitive);
     let config = Config {
@@ -59,6 +66,7 @@ pub(super) fn configuration(
         ..usual
     };
     must_expect_forces(&config)?;
+    experiment::check(&config).map_err(|error| failure(error, command))?;
     if let (Some(_), false) = (&command.primitive, command.figures_only) {
         keep(&config.primitive, &file(command, out), out)?;
     }
@@ -220,10 +228,15 @@ fn primitive(
         return Err(Failure::new(ErrorCode::NoResults, REFUSED, cause)
             .help("name the primitive that was tried with `--primitive`, or the folder with `--out`"));
     }
+    let is_new = !out.exists();
     // A folder that cannot be had is told before the minutes of teaching.
     files::create_folder(out, DOING)?;
     let teaching = Teaching { scenario: command.scenario, plant, speed: command.learn_speed, number };
     let made = taught(command, teaching, &file, interrupt, output);
+    if is_new && made.is_err() {
+        // It is removed only if it is empty; who broke off after the teaching finds the primitive.
+        let _ = std::fs::remove_dir(out);
+    }
     let primitive = made.map_err(preparation_failure)?;
     output.say(format!("taught, learned and rehearsed: {}", file.display()));
     Ok(primitive)
