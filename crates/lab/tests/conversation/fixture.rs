@@ -112,6 +112,8 @@ pub(crate) struct Device {
     pub(crate) without_cycles: bool,
     /// Answers that are still to be "the storage is being read".
     pub(crate) reading: u32,
+    /// Control cycles for which a stop still brakes, and the way of each joint so far (rad).
+    pub(crate) braking: (u32, f32),
 }
 
 impl Device {
@@ -144,6 +146,7 @@ impl Device {
             armless: false,
             without_cycles: false,
             reading: 0,
+            braking: (0, 0.0),
         }
     }
 
@@ -151,7 +154,10 @@ impl Device {
         self.steps += 1;
         if self.steps.is_multiple_of(3) {
             let cycle = u64::from(self.steps / 3);
-            let record = CycleRecord { cycle, state: self.half.state, ..CycleRecord::EMPTY };
+            if self.half.state == State::SoftStop && self.braking.0 > 0 {
+                self.braking = (self.braking.0 - 1, self.braking.1 + 0.002);
+            }
+            let record = CycleRecord { cycle, state: self.half.state, q: [self.braking.1; 7], ..CycleRecord::EMPTY };
             if self.without_cycles {
                 self.half.events.push_back(Event { cycle, kind: EventKind::Arrived });
             } else {

@@ -287,6 +287,25 @@ fn an_interrupt_stops_the_arm_before_the_command_ends() {
     assert_eq!(client.transport().half.state, State::SoftStop);
 }
 
+/// The change that makes it fail: an arm that has left its motion counts as standing, and is still braking.
+#[test]
+fn a_command_that_is_interrupted_ends_when_its_arm_stands_still() {
+    for (cycles, longest) in [(75, 0.35), (u32::MAX, 1.1)] {
+        let mut client = connected();
+        let interrupt = Interrupt::never();
+        client.set_interrupt(interrupt.clone());
+        client.gravity().unwrap();
+        client.transport().braking.0 = cycles;
+        interrupt.raise();
+        let started = client.now();
+        let error = client.next(Duration::from_secs(10)).unwrap_err();
+        assert!(matches!(error, HostError::Interrupted));
+        let took = (client.now() - started).as_secs_f64();
+        assert!(took < longest, "{took} s: an arm that never rests is not waited for");
+        assert!(client.transport().braking.0 == 0 || cycles == u32::MAX, "after {took} s it still moves");
+    }
+}
+
 /// The change that makes it fail: parts are sent whatever the user wishes.
 #[test]
 fn an_interrupt_in_the_middle_of_an_upload_leaves_the_device_what_it_had() {
