@@ -100,6 +100,7 @@ fn a_run_that_was_played_tells_how_it_went_though_its_recording_has_no_place() {
     let told: Value = serde_json::from_slice(&ended.stdout).unwrap();
     assert_eq!((told["error"]["code"].as_str(), ended.status.code()), (Some("E230"), Some(2)), "{told}");
     assert!(told["result"]["tracking"]["samples"].as_u64().is_some_and(|samples| samples > 1000), "{told}");
+    assert!(told["result"]["preconditions"].as_array().is_some_and(|list| !list.is_empty()), "{told}");
     assert_eq!(std::fs::read_to_string(at.join("run.csv")).unwrap(), "mine");
 }
 

@@ -173,6 +173,7 @@ fn carry_out(
         (Err(failure), Some(record)) => return record.end(Err(failure), output),
         (Err(failure), None) => return Err(failure),
     };
+    let report = Report { ready_s, preconditions, ..report };
     if let Err(failure) = written {
         // The run itself went to its end: how it went is told all the same.
         return Err(with_result(failure, &report, global)?);
@@ -180,7 +181,7 @@ fn carry_out(
     if !client.is_simulated() {
         output.say("the arm holds its goal; `tactus stop` ends that");
     }
-    Ok(Report { ready_s, preconditions, ..report })
+    Ok(report)
 }
 
 /// The failure of a run that ended elsewhere than at its goal.
