@@ -13,7 +13,10 @@ pub(crate) fn text(word: &str) -> String {
 
 /// A path as a shell takes it for one word.
 pub(crate) fn path(path: &Path) -> String {
-    text(&path.to_string_lossy())
+    let word = path.to_string_lossy();
+    // It would be taken for an option.
+    let before = if word.starts_with('-') { "./" } else { "" };
+    text(&format!("{before}{word}"))
 }
 
 #[cfg(test)]
@@ -27,6 +30,7 @@ mod tests {
             assert_eq!(text(plain), plain);
         }
         assert_eq!(path(Path::new("my reach.toml")), "'my reach.toml'");
+        assert_eq!(path(Path::new("-a.toml")), "./-a.toml");
         assert_eq!(text("it's"), r"'it'\''s'");
         assert_eq!(text(""), "''");
     }

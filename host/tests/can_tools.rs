@@ -331,3 +331,35 @@ fn a_replay_that_is_interrupted_says_that_nothing_can_be_said() {
     assert_eq!(ended.status.code(), Some(130), "{said}");
     assert!(said.contains("nothing can be said") && ended.stdout.is_empty(), "{said}");
 }
+
+/// The change that makes it fail: a log that is shorter than what was read of it is waited for.
+#[test]
+fn a_log_that_is_begun_anew_is_followed_from_its_beginning() {
+    use std::io::{BufRead, BufReader};
+    use std::process::Stdio;
+
+    let (_, log) = recorded();
+    let part = |lines: std::ops::Range<usize>| {
+        log.lines().skip(lines.start).take(lines.len()).map(|line| format!("{line}\n")).collect::<String>()
+    };
+    let (folder, file) = log_file(&part(0..40));
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_tactus"));
+    command.current_dir(folder.path()).args(["--json", "can", "decode", "--follow", "bus.log"]);
+    let mut follower = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let output = follower.stdout.take().unwrap();
+    let (sender, receiver) = std::sync::mpsc::channel();
+    std::thread::spawn(move || BufReader::new(output).lines().map_while(Result::ok).for_each(|l| drop(sender.send(l))));
+    let next = |count: usize| -> Vec<Value> {
+        let wait = std::time::Duration::from_secs(20);
+        let lines = (0..count).map_while(|_| receiver.recv_timeout(wait).ok());
+        lines.map(|line| serde_json::from_str(&line).unwrap()).collect()
+    };
+    let first = next(40);
+    std::fs::write(&file, part(0..10)).unwrap();
+    let again = next(10);
+    let _ = follower.kill();
+    let ended = follower.wait_with_output().unwrap();
+    assert_eq!((first.len(), again.len()), (40, 10), "what stands in the new log is told");
+    assert!(first.iter().zip(&again).all(|(one, other)| one["time_s"] == other["time_s"]), "{again:?}");
+    assert!(String::from_utf8_lossy(&ended.stderr).contains("bus.log was begun anew"));
+}

@@ -382,6 +382,36 @@ fn options_of_the_simulated_teacher_are_refused_where_there_is_none() {
     succeeds(at, &format!("{DEVICE} teach --duration 1 -o a.csv"));
 }
 
+/// The changes that make it fail: surroundings that are not there are ignored; nothing is none of the simple world's.
+#[test]
+fn surroundings_are_refused_where_there_are_none() {
+    let folder = learned();
+    let at = folder.path();
+    let mut serve = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    serve.current_dir(at).args(["--device", "sil:world=simple", "sim"]).stdin(Stdio::null());
+    let mut served = Ended(serve.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    while !at.join("tactus.sock").exists() {
+        assert_eq!(served.0.try_wait().unwrap(), None, "the simulated arm does not listen");
+        std::thread::yield_now();
+    }
+    let before = std::fs::read(at.join("reach.toml")).unwrap();
+    for (device, surroundings) in [
+        ("--device unix:tactus.sock", "nothing"),
+        ("--device unix:tactus.sock", "table"),
+        (DEVICE, "table"),
+        (DEVICE, "object"),
+    ] {
+        let (exit, code, message, help) =
+            refused(at, &format!("{device} rehearse reach.toml --trials 1 --surroundings {surroundings}"));
+        assert!(exit == 2 && code == "E200" && message.contains("`--surroundings`"), "{code}: {message}");
+        assert!(help.contains("leave it out"), "{help}");
+        assert!(std::fs::read(at.join("reach.toml")).unwrap() == before, "nothing was remembered");
+    }
+    drop(served);
+    succeeds(at, &format!("{DEVICE} rehearse reach.toml --trials 1 --surroundings nothing"));
+    succeeds(at, &format!("{DEVICE} rehearse reach.toml --trials 1"));
+}
+
 /// A newcomer leaves out the ending, or expects that a simulated device remembers the last command.
 #[test]
 fn a_primitive_that_is_not_there_is_named_with_the_place_where_it_may_be() {

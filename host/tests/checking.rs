@@ -4,7 +4,7 @@ use std::path::Path;
 
 use lab::demonstration::{Preparation, Recording};
 use lab::learn::{LearnOptions, learn};
-use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
+use lab::primitive_file::{ExpectationTable, PrimitiveFile, PrimitiveFileError};
 use lab::procedure::{Change, ChangeKind};
 use link::Goal;
 use tactus::check::{CheckReport, Course, Limit, check};
@@ -171,4 +171,50 @@ fn a_duration_that_the_integration_cannot_follow_is_refused() {
     primitive.movement.duration = 15.0 * control::PERIOD;
     let error = check(&primitive, &Course::stored(1.0), |_| {}).unwrap_err();
     assert!(matches!(error, PrimitiveFileError::Invalid { .. }), "{error}");
+}
+
+/// The primitive with an expectation: a force (N, world axes) in three of its samples.
+fn expecting(force: [f64; 3]) -> PrimitiveFile {
+    let mut primitive = reach(5.0);
+    let mut mean = vec![vec![0.0; 9]; 100];
+    mean[60..63].iter_mut().for_each(|sample| sample[..3].copy_from_slice(&force));
+    primitive.expectation = Some(ExpectationTable {
+        model_hash: primitive.model_hash,
+        recorded_duration: primitive.movement.duration,
+        payload_mass: 0.0,
+        payload_centre: [0.0; 3],
+        filter_cutoff: 15.0,
+        trials: 3,
+        spread_floor: 0.02,
+        mean,
+        spread: Vec::new(),
+    });
+    primitive
+}
+
+/// A run would stop there as `ContactForce`. The changes that make it fail: `expected::check` is not called; the lever
+/// between hand and sensor is left out.
+#[test]
+fn an_expectation_that_the_sensor_cannot_measure_is_told_with_its_sample_force_and_bound() {
+    let calm = checked(&expecting([0.0; 3]));
+    assert!(calm.passed(), "{}", calm.to_text());
+    assert_eq!(calm.margins.len(), 4 + 1 + 7 + 7 + 7 + 1 + 1 + 2 + 1 + 7);
+    let refused = |newton: f64| {
+        let all = (0..3).map(|axis| {
+            let mut force = [0.0; 3];
+            force[axis] = newton;
+            checked(&expecting(force))
+        });
+        all.filter(|report| !report.passed()).collect::<Vec<_>>()
+    };
+    assert!(refused(15.0).is_empty());
+    let reports = refused(-45.0);
+    assert!(reports.len() >= 2, "{}: only a force along the hand has no lever", reports.len());
+    for report in reports {
+        let told = report.violations.join("; ");
+        assert!(told.contains("of 100 expects 45.0 N (") && told.contains("stop a run"), "{told}");
+        assert!(report.advice().contains("`tactus rehearse`"), "{}", report.advice());
+        let margin = report.margins.iter().find(|margin| margin.limit == Limit::ExpectedAtSensor).unwrap();
+        assert!(margin.margin < 0.0 && (margin.bound - margin.value - margin.margin).abs() < 1e-9, "{margin:?}");
+    }
 }

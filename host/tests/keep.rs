@@ -86,16 +86,54 @@ fn a_run_that_fails_is_kept_as_well_with_its_failure_and_what_was_recorded() {
     assert!(said.contains("everything about this run is in here"), "{said}");
 }
 
+/// The change that makes it fail: the folder is made behind the upload.
 #[test]
-fn a_folder_that_cannot_be_made_is_told_before_anything_moves() {
+fn a_folder_that_cannot_be_made_is_told_before_anything_is_sent() {
     let folder = learned();
     let at = folder.path();
     std::fs::write(at.join("runs"), "a file").unwrap();
-    let refused = tactus(at, &format!("{DEVICE} run reach.toml --keep")).failure().code(2);
-    let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
-    assert!(
-        said.contains("run refused: making the folder runs: a file has that name") && !said.contains("running 'reach'"),
-        "{said}"
-    );
+    for (place, words) in [("", "making the folder runs: a file has that name"), (" /proc/runs", "/proc/runs")] {
+        let refused = tactus(at, &format!("{DEVICE} run reach.toml --keep{place}")).failure().code(2);
+        let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        assert!(said.contains("run refused: ") && said.contains(words), "{said}");
+        assert!(!said.contains("is in the device") && !said.contains("running 'reach'"), "{said}");
+    }
     assert_eq!(std::fs::read_to_string(at.join("runs")).unwrap(), "a file");
+}
+
+/// The change that makes it fail: nobody calls `discard`.
+#[test]
+fn a_run_whose_primitive_the_device_does_not_take_leaves_no_folder() {
+    let folder = learned();
+    let at = folder.path();
+    let device = "--device sil:world=simple,flash=arm.flash --non-interactive";
+    tactus(at, "secret new lab.secret").success();
+    tactus(at, &format!("{device} secret set lab.secret")).success();
+    tactus(at, &format!("{device} run reach.toml --keep")).failure().code(5);
+    assert_eq!(names(&at.join("runs")), Vec::<String>::new());
+    tactus(at, &format!("{device} --secret-file lab.secret run reach.toml --keep")).success();
+    assert_eq!(names(&only(&at.join("runs"))).len(), 4);
+}
+
+/// The change that makes it fail: `hint` gives nothing, or does not look at what is a folder.
+#[test]
+fn a_primitive_that_an_option_has_taken_for_its_folder_is_told_with_the_line_to_type() {
+    let folder = learned();
+    let at = folder.path();
+    let told = |line: &str| {
+        let refused = tactus(at, line).failure().code(2);
+        let output = refused.get_output();
+        let data = serde_json::from_slice::<Value>(&output.stdout).unwrap_or_default();
+        (String::from_utf8_lossy(&output.stderr).into_owned(), data["error"]["help"].as_str().unwrap_or("").to_owned())
+    };
+    let hint = "`--keep` took reach.toml as its folder: `tactus --json run reach.toml --keep --speed 1.5`";
+    let (said, help) = told("--json run --keep reach.toml --speed 1.5");
+    assert!(said.contains(&format!("  help: {hint}")) && help == hint, "{said}: {help}");
+    std::fs::create_dir(at.join("runs")).unwrap();
+    for line in
+        ["--json run --keep runs", "--json run --keep", "--json run --speed 1.5", "--json run --keep a --sped 1"]
+    {
+        let (said, help) = told(line);
+        assert!(!said.contains("as its folder") && !help.contains("as its folder"), "{line}: {said}: {help}");
+    }
 }

@@ -50,6 +50,21 @@ fn a_report_is_written_once_and_replaced_only_when_told_to() {
     assert!(!folder.join("other.html").exists());
 }
 
+/// The changes that make it fail: `once_each` gives all that it got, `tell_apart` is not called.
+#[test]
+fn a_run_that_is_given_twice_is_reported_once_and_runs_of_one_name_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for name in ["one", "two"] {
+        std::fs::create_dir(folder.join(name)).unwrap();
+        std::fs::write(folder.join(name).join("run.csv"), common::text(&common::rows(3.0))).unwrap();
+    }
+    let told = tactus(folder, &["report", "one/run.csv", "two/run.csv", "one/../one/run.csv"]).success();
+    assert_eq!(stderr(&told), "warning: one/../one/run.csv is given twice: it is drawn once\n");
+    let lines = ["one/run.csv: no movement was played", "two/run.csv: no movement was played", "wrote report.html\n"];
+    assert_eq!(stdout(&told), lines.join("\n"));
+}
+
 /// The change that makes it fail: a recording of two runs is looked at without a word.
 #[test]
 fn who_looks_at_a_recording_of_two_runs_is_told_that_the_last_is_taken() {

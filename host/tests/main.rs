@@ -39,4 +39,5 @@ mod settings;
 mod stand_in;
 mod storage;
 mod tare;
+mod warnings;
 mod weighing;

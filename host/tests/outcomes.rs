@@ -141,6 +141,8 @@ fn recordings_say_where_they_come_from_and_no_command_mixes_movements() {
         "statistics reach.toml other.csv",
         "statistics reach.toml reach.csv other.csv",
         "compare reach.csv other.csv",
+        "report reach.csv other.csv -o figure.svg",
+        "report reach.csv demo.csv other.csv -o figure.svg",
         "plot -p reach.toml -r other.csv -o figure.svg",
     ] {
         let refused = tactus(at, line).failure().code(6);
@@ -236,4 +238,20 @@ fn a_demonstration_that_nobody_ends_is_no_success_and_what_was_recorded_is_kept(
     assert!(!folder.path().join("demo.csv").exists(), "it is no demonstration");
     run("\n").success();
     assert!(folder.path().join("demo.csv").exists());
+}
+
+/// The changes that make it fail: nobody calls `tell_unkept`, or it does not look for the option.
+#[test]
+fn a_rehearsal_that_ends_early_says_that_nothing_of_it_is_kept_or_where_it_is() {
+    let folder = learned(3.0, "");
+    let at = folder.path();
+    let script = "[[scenario]]\nname = \"a stuck encoder\"\nfrom = \"run\"\n\
+        inject = [{ at = 8.5, what.freeze = { kind = \"position\", from = [4] } }]\n";
+    std::fs::write(at.join("stuck.toml"), script).unwrap();
+    let line = "--device sil:world=simple,faults=stuck.toml --non-interactive rehearse reach.toml";
+    let failed = stderr(&tactus(at, line).failure().code(5));
+    assert!(failed.contains("nothing that was measured is kept; `--record-dir FOLDER`"), "{failed}");
+    let failed = stderr(&tactus(at, &format!("{line} --record-dir kept")).failure().code(5));
+    assert!(!failed.contains("is kept; ") && failed.contains("kept/reach-1.csv.part"), "{failed}");
+    assert!(at.join("kept/reach-1.csv.part").exists());
 }

@@ -124,6 +124,7 @@ fn cli_11_another_arms_settings_need_force() {
     let other = text.replace("serial = \"simulated\"", "serial = \"WAM-7\"").replace("-1.95", "-1.9");
     std::fs::write(folder.join("other.toml"), &other).unwrap();
     refused(folder, &["config", "restore", "other.toml"], "E646", "'WAM-7', this is 'simulated'");
+    refused(folder, &["config", "restore", "other.toml"], "E646", "board: `tactus config restore other.toml --force`");
     let forced = object(folder, &["config", "restore", "other.toml", "--force"], 0);
     assert_eq!(forced["changes"], json!([{ "key": "home.joint_2_rad", "before": -1.95, "after": -1.9 }]));
 }

@@ -53,7 +53,7 @@ fn observer<R: Real>(bencher: Bencher<'_, '_>) {
         let mut observer = observer.borrow_mut();
         let state = JointState::whole(*q, JointVelocities(q.0));
         observer.update(&state, false);
-        let velocity = observer.velocity(&state, control::sense::observer::Trust::Compliant);
+        let velocity = observer.velocity(&state, control::sense::observer::Trust::Compliant, &state.dq.0);
         observer.send(model, frames, &velocity, &q.0);
         velocity
     });

@@ -18,8 +18,8 @@ pub struct Carried {
     pub trials: usize,
     /// Trials in which it was held.
     pub held: usize,
-    /// Distance of the hand below its plan when it has lifted, m: median over the trials; `null` where every arm
-    /// stopped before.
+    /// Distance of the hand below or above its plan when it has lifted, m, over the last second of the run: median over
+    /// the trials; `null` where every arm stopped before.
     pub sag_median_m: Option<f64>,
     /// The same, the worst trial.
     pub sag_max_m: Option<f64>,

@@ -85,7 +85,8 @@ pub fn carried(case: Case, results: &Results, mass: f64) -> Vec<Carried> {
     let of_mode = |mode| {
         // An arm that stopped has lifted nothing; earlier versions wrote a sag of 0 for it.
         let went_on = results.of(mode).filter(|report| !report.is_stopped());
-        let sags: Vec<f64> = went_on.filter_map(|report| report.sag_m).collect();
+        // Half of the arms rest above their plan: as a sag that would be better than none.
+        let sags: Vec<f64> = went_on.filter_map(|report| report.sag_m).map(f64::abs).collect();
         let free: Vec<f64> = results.of(mode).filter_map(|report| report.free_sag_m).map(f64::abs).collect();
         Carried {
             case: case.name(),
@@ -106,7 +107,7 @@ pub fn carried(case: Case, results: &Results, mass: f64) -> Vec<Carried> {
 /// As a table.
 pub fn table(rows: &[Carried]) -> String {
     let heads =
-        ["mode", "remembered", "carried", "held", "sag, median", "sag, largest", "off before a touch", "largest"];
+        ["mode", "remembered", "carried", "held", "off when lifted", "largest", "off before a touch", "largest"];
     let mut table = Table::new(heads);
     let millimetres = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |m| format!("{:.1} mm", m * 1e3));
     for row in rows {

@@ -135,7 +135,7 @@ pub fn table(summaries: &[Summary]) -> String {
         or_none(s.chatter_n, |force| format!("{:.2} N  {:.2} N", force.median, force.max))
     });
     row("hand on table, max", &|s| or_none(s.table_peak_n, |force| format!("{:.1} N", force.max)));
-    row("sag when lifted, median, max", &|s| millimetres(s.sag_m));
+    row("off its plan when lifted, median, max", &|s| millimetres(s.sag_m));
     row("off its height before a touch, median, max", &|s| millimetres(s.free_sag_m));
     row("shaking above 15 Hz, median, max", &|s| {
         or_none(s.shaking_rad_s, |speed| format!("{:.2}  {:.2} rad/s", speed.median, speed.max))

@@ -234,7 +234,7 @@ impl Summary {
                 / reports.len().max(1) as f64,
             chatter_n: measured(|report| report.measures.chatter_n),
             table_peak_n: spread(|report| report.measures.table_peak_n),
-            sag_m: measured(|report| report.sag_m),
+            sag_m: measured(|report| report.sag_m.map(f64::abs)),
             free_sag_m: measured(|report| report.free_sag_m.map(f64::abs)),
             // What an arm shook that its shaking stopped is the largest of all.
             shaking_rad_s: Spread::of(

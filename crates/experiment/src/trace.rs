@@ -1,5 +1,6 @@
 //! The telemetry of a run, cycle by cycle: the material of the time series and of the adaptation.
 
+use control::State;
 use lab::demonstration::RATE;
 
 use super::shaking::high_pass;
@@ -7,8 +8,8 @@ use super::shaking::high_pass;
 /// Sensor channels of an expectation: force (world axes), torque (tool axes), gauges of F1 to F3.
 pub const CHANNELS: usize = 9;
 
-/// Time in free air over which the height of the hand is averaged, s.
-const FREE_SECONDS: f64 = 1.0;
+/// Time over which the height of the hand is averaged, s.
+const MEAN_SECONDS: f64 = 1.0;
 
 /// Frequency above which the force at the wrist is chatter, Hz.
 const CHATTER: f64 = 3.0;
@@ -18,6 +19,8 @@ const CHATTER: f64 = 3.0;
 pub struct Cycle {
     /// Time after the primitive started, s.
     pub time: f64,
+    /// True while the primitive runs: before and after it the plan is another one.
+    pub runs: bool,
     /// Measured grasp point, world, m.
     pub position: [f64; 3],
     /// Measured orientation, tool to world (w, x, y, z).
@@ -73,10 +76,17 @@ impl Trace {
         (count > 0.0).then(|| sum / count)
     }
 
+    /// The same over the last second of the run: what holds the hand behind it has another plan. `None` where no run
+    /// lasted for so long.
+    pub fn lifted_sag(&self) -> Option<f64> {
+        let end = self.cycles.iter().rev().find(|cycle| cycle.runs)?.time;
+        if end >= MEAN_SECONDS { self.sag(end - MEAN_SECONDS, end) } else { None }
+    }
+
     /// The same over the last second before something is touched (s after the start): what a free hand sags. `None`
     /// where the hand was not free for so long.
     pub fn free_sag(&self, touched: f64) -> Option<f64> {
-        if touched >= FREE_SECONDS { self.sag(touched - FREE_SECONDS, touched) } else { None }
+        if touched >= MEAN_SECONDS { self.sag(touched - MEAN_SECONDS, touched) } else { None }
     }
 
     /// Content above 3 Hz of the force at the wrist between two times, N: root mean square of the vector; `None`
@@ -103,6 +113,7 @@ impl Cycle {
         let cycles = telemetry.cycle.wrapping_sub(first) as i32;
         Cycle {
             time: f64::from(cycles) / RATE,
+            runs: telemetry.state == State::Run.code(),
             position,
             orientation,
             position_d: [x, y, z],
@@ -126,6 +137,7 @@ pub(crate) mod tests {
     pub(crate) fn cycle(time: f64) -> Cycle {
         Cycle {
             time,
+            runs: true,
             position: [0.7, 0.2, 0.0],
             orientation: [1.0, 0.0, 0.0, 0.0],
             position_d: [0.7, 0.2, 0.0],
@@ -190,6 +202,22 @@ pub(crate) mod tests {
         assert!((trace.sag(1.5, 2.5).unwrap() - 0.004).abs() < 1e-12);
         assert!((trace.sag(1.5, 3.5).unwrap() + 0.008).abs() < 1e-12);
         assert_eq!(trace.sag(7.0, 8.0), None, "there was no cycle");
+    }
+
+    /// The change that makes it fail: the second counts from the last cycle on, as it was. What holds a load behind a
+    /// run has a plan that is centimetres above the hand.
+    #[test]
+    fn a_lifted_hand_sags_over_the_last_second_of_its_run_and_not_behind_it() {
+        let mut trace = Trace { cycles: (0..900).map(|k| cycle(f64::from(k) / RATE)).collect() };
+        for cycle in &mut trace.cycles {
+            cycle.runs = cycle.time < 2.5;
+            cycle.position_d[2] += if cycle.time < 1.45 || !cycle.runs { 1.0 } else { 0.01 };
+        }
+        assert!((trace.lifted_sag().unwrap() - 0.01).abs() < 1e-12);
+        trace.cycles.retain(|cycle| cycle.time < 0.9 || !cycle.runs);
+        assert_eq!(trace.lifted_sag(), None, "it did not run for a second");
+        trace.cycles.retain(|cycle| !cycle.runs);
+        assert_eq!(trace.lifted_sag(), None, "it did not run");
     }
 
     #[test]

@@ -209,7 +209,7 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
         // reached.
         sag_m: match (&fault, config.scenario.lifts_itself()) {
             (Some(_), _) => None,
-            (None, true) => trace.sag(arrived - run - SETTLED_SECONDS, arrived - run),
+            (None, true) => trace.lifted_sag(),
             (None, false) => trace.sag(end - run - SETTLED_SECONDS, end - run),
         },
         free_sag_m: trace.free_sag(measures.free_until()),

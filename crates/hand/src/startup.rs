@@ -259,7 +259,8 @@ impl Startup {
             Step::Read { digit, item } => return self.read(digit, item, outlet),
             Step::Rest { until_us } => {
                 if now_us >= until_us {
-                    self.step = Step::Enumerate { digit: 0 };
+                    // A puck that was not heard may not have heard that its torque has ended either.
+                    self.step = Step::ZeroTorques { frame: 0 };
                 }
             }
             Step::Done => {}

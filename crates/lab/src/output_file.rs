@@ -251,6 +251,10 @@ fn may_write(target: &Path, force: bool, inputs: &[&Path]) -> Result<(PathBuf, O
 /// The place behind links, and what is there.
 fn inspect(target: &Path) -> Result<(PathBuf, Option<Metadata>), OutputError> {
     let refused = |found| Err(OutputError::NotAFile { file: target.to_owned(), found });
+    // Elsewhere that is standard output; whoever wants a file of that name says `./-`.
+    if target.as_os_str() == "-" {
+        return refused("standard output");
+    }
     match fs::metadata(target) {
         Ok(found) if found.is_file() => {
             let is_link = fs::symlink_metadata(target).is_ok_and(|found| found.is_symlink());
@@ -347,7 +351,7 @@ mod tests {
         let (link, dead) = (folder.path().join("link.csv"), folder.path().join("dead.csv"));
         fs::hard_link(&input, &link).unwrap();
         std::os::unix::fs::symlink("nowhere", &dead).unwrap();
-        for place in [Path::new("/dev/null"), folder.path(), dead.as_path(), Path::new("/dev/..")] {
+        for place in [Path::new("/dev/null"), folder.path(), dead.as_path(), Path::new("/dev/.."), Path::new("-")] {
             let refused = OutputFile::create(place, true, &[]);
             assert!(matches!(refused, Err(OutputError::NotAFile { .. })), "{}: {refused:?}", place.display());
         }

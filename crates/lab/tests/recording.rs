@@ -94,6 +94,31 @@ fn a_mark_of_utf_8_and_blank_lines_do_not_hide_the_movement_that_a_recording_nam
     }
 }
 
+/// The change that makes it fail: `with_newlines` gives the bytes as they are.
+#[test]
+fn a_recording_whose_lines_end_in_carriage_returns_alone_is_read_with_its_notes_and_lines() {
+    let lines = format!("# primitive: reach 0x0a1b2c3d\n{}\n", good().join("\n"));
+    let [usual, returns] = [lines.clone(), lines.replace('\n', "\r")].map(|text| {
+        let read = Recording::parse(Path::new(FILE), text.as_bytes()).unwrap();
+        (read.origin.primitive.map(|played| played.name), read.lines, read.time)
+    });
+    assert!(usual.0.as_deref() == Some("reach") && usual == returns);
+    let wrong = lines.replace(&good()[20], "1,2").replace('\n', "\r");
+    names(&Recording::parse(Path::new(FILE), wrong.as_bytes()).unwrap_err(), 22, 3);
+}
+
+/// The change that makes it fail: any word is taken for a state.
+#[test]
+fn a_word_that_names_no_state_is_refused_with_its_place() {
+    let error = parse(&with_field(40, "state", "runn")).unwrap_err();
+    assert!(matches!(error, RecordingError::UnknownState { .. }), "{error}");
+    names(&error, 40, column("state") + 1);
+    assert!(error.to_string().contains("`runn` is no state, expected `idle`, `gravity`"), "{error}");
+    for state in control::State::ALL.map(control::State::name).into_iter().chain(["unknown"]) {
+        assert!(parse(&with_field(40, "state", state)).is_ok(), "{state}");
+    }
+}
+
 #[test]
 fn time_that_runs_backwards_or_stands_still_is_refused_with_its_place() {
     let before = good()[50].split(',').nth(column("t_s")).expect("a time").to_owned();

@@ -35,10 +35,14 @@ impl CheckReport {
         // Such a plan comes to its goal in motion, or short of it: its end was cut off, or was never at rest.
         let of_goal = broken().next().is_some()
             && broken().all(|margin| matches!(margin.limit, Limit::GoalPosition | Limit::GoalOrientation));
+        let of_expectation = broken().next().is_some()
+            && broken().all(|margin| matches!(margin.limit, Limit::ExpectedAtSensor | Limit::ExpectedTorque));
         let is_unfit =
             broken().next().is_none() && self.violations.iter().any(|violation| violation.starts_with(UNFIT));
         let last = if is_unfit {
             "no speed and no goal helps: learn it again, from another demonstration or with other options"
+        } else if of_expectation {
+            "record what it expects again (`tactus rehearse`)"
         } else if of_hand {
             "learn it again with other angles of the hand (`--hand-start`, `--hand-goal`)"
         } else if of_goal && self.goal_m.is_none() {

@@ -6,6 +6,7 @@
 
 mod advice;
 mod closed_loop;
+mod expected;
 mod plant;
 
 use control::guard::monitor::{HAND_SPEED_LIMIT, TIP_SPEED_LIMIT};
@@ -57,6 +58,10 @@ pub enum Limit {
     GoalPosition,
     /// Angle from the goal at the end of the run, rad.
     GoalOrientation,
+    /// Torque about the force sensor if it measures what is expected, N m.
+    ExpectedAtSensor,
+    /// Joint torque if the arm presses as it expects, N m.
+    ExpectedTorque,
 }
 
 impl Limit {
@@ -72,6 +77,8 @@ impl Limit {
             Limit::HandPosition => ("range", "rad"),
             Limit::GoalPosition => ("goal distance", "m"),
             Limit::GoalOrientation => ("goal angle", "rad"),
+            Limit::ExpectedAtSensor => ("expected, at the sensor", "N m"),
+            Limit::ExpectedTorque => ("expected torque", "N m"),
         }
     }
 }
@@ -262,6 +269,13 @@ pub fn check(
     check_plan(&primitive, course.speed, &mut report);
     let run = ClosedLoop::play(&primitive, course, progress);
     check_run(file, course, &run, &mut report);
+    violations(&mut report);
+    expected::check(file, &primitive, &run, &mut report);
+    Ok(report)
+}
+
+/// Says which margins are negative.
+fn violations(report: &mut CheckReport) {
     for margin in &report.margins {
         // A NaN is no margin either.
         if margin.margin.is_nan() || margin.margin < 0.0 {
@@ -274,7 +288,6 @@ pub fn check(
             ));
         }
     }
-    Ok(report)
 }
 
 /// Check sum of an image as the device tells it: of everything before the check sum at its end.

@@ -88,6 +88,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             let stored = store(&mut client, home.map(|angle| angle as f32), None, global);
             report.write("home", stored.is_ok(), &json!({ "home_rad": home }), global)?;
             stored?;
+            global.tell_forgotten();
             show(&mut client, global)
         }
         Action::Home(Home { here: Some(truth), at_home, report, .. }) => {
@@ -98,6 +99,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             let stored = store(&mut client, correction.home, Some(&correction), global);
             report.write("home", stored.is_ok(), &data(&correction), global)?;
             stored?;
+            global.tell_forgotten();
             global.output().result(&data(&correction), format!("{}stored in the device", table(&correction)))
         }
         Action::Home(Home { here: None, set: None, .. }) => {

@@ -18,7 +18,7 @@ pub struct Cmd {
     #[arg(value_name = "PRIMITIVE")]
     pub primitive: PathBuf,
     /// Speed factor at which it will be run, 0.1 to 2
-    #[arg(long, default_value_t = 1.0, value_parser = factor)]
+    #[arg(long, default_value_t = 1.0, value_parser = factor, allow_hyphen_values = true)]
     pub speed: f64,
     /// Another goal of the grasp point, world frame, m
     #[arg(long, value_name = "X,Y,Z", value_parser = super::learn::numbers::<3>, allow_hyphen_values = true)]

@@ -18,7 +18,7 @@ pub struct Cmd {
     #[arg(value_name = "OTHER")]
     pub other: PathBuf,
     /// Force that counts as a contact, N
-    #[arg(long, default_value_t = 1.0, value_name = "NEWTON", value_parser = force)]
+    #[arg(long, default_value_t = 1.0, value_name = "NEWTON", value_parser = force, allow_hyphen_values = true)]
     pub contact: f64,
 }
 
@@ -31,18 +31,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         |cause: Box<dyn std::error::Error + Send + Sync>| Failure::of_file(ErrorCode::CompareInput, "compare", cause);
     let one = Recording::read(&command.one).map_err(|cause| invalid(cause.into()))?;
     let other = Recording::read(&command.other).map_err(|cause| invalid(cause.into()))?;
-    if one.origin.contradicts(&other.origin) {
-        let name =
-            |recording: &Recording| recording.origin.primitive.as_ref().map(ToString::to_string).unwrap_or_default();
-        let text = format!(
-            "{} shows the movement {}, {} shows {}",
-            one.file.display(),
-            name(&one),
-            other.file.display(),
-            name(&other)
-        );
-        return Err(Failure::new(ErrorCode::RecordingOfOthers, "compare refused", text));
-    }
+    plot::same_as(&one, &other, "compare refused")?;
     [&one, &other].into_iter().for_each(|recording| plot::tell_of_others(recording, global.output()));
     for recording in [&one, &other].into_iter().filter(|recording| recording.origin.primitive.is_none()) {
         global.output().warn(format!("{} does not name its movement", recording.file.display()));

@@ -64,8 +64,8 @@ pub(super) fn open_to_change_secret(global: &Global, doing: &str) -> Result<Clie
 pub(super) fn read_secret(file: &Path, output: Output) -> Result<Secret, SecretFileError> {
     let secret = secret_file::read(file)?;
     if secret_file::is_open_to_others(file) {
-        let name = file.display();
-        output.warn(format!("others than its owner may read or change {name}: `chmod 600 {name}`"));
+        let (name, word) = (file.display(), quoted::path(file));
+        output.warn(format!("others than its owner may read or change {name}: `chmod 600 {word}`"));
     }
     Ok(secret)
 }
@@ -173,7 +173,7 @@ fn socket_help(address: &Address, error: &TransportError) -> Option<String> {
     };
     match (address, error) {
         (Address::Unix(path), TransportError::Permission { .. }) => {
-            Some(format!("check the rights of the socket with `ls -l {}`", path.display()))
+            Some(format!("check the rights of the socket with `ls -l {}`", quoted::path(path)))
         }
         // A socket whose program was killed is still there, and the next one takes its place.
         (Address::Unix(path), TransportError::NotFound { .. }) => {
@@ -282,13 +282,17 @@ fn watch(
     });
     spinner.finish_and_clear();
     let readiness = result.map_err(|error| failed(client, error, doing))?;
-    if let Some(source @ (HomeSource::Damaged | HomeSource::Foreign)) = readiness.zeroed_at {
-        output.warn(format!(
-            "the arm was zeroed at another home than its own: {}; `tactus calibrate show`",
-            source.name()
-        ));
+    if let Some(words) = readiness.zeroed_at.and_then(doubtful_zero) {
+        output.warn(words);
     }
     Ok(readiness)
+}
+
+/// The warning of a zeroing at a home that is not the arm's own, though it has one.
+fn doubtful_zero(source: HomeSource) -> Option<String> {
+    let is_doubtful = matches!(source, HomeSource::Damaged | HomeSource::Foreign);
+    let name = source.name();
+    is_doubtful.then(|| format!("the arm was zeroed at another home than its own: {name}; `tactus calibrate show`"))
 }
 
 /// The failure of a request that the device refused.
@@ -469,4 +473,20 @@ pub(super) fn simulated(
         OpenError::Simulation(error) => simulation_failure(error, doing),
     })?;
     Ok((device, interrupt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The change that makes it fail: a zeroing at the model's home, or at any other, is told of, or none is.
+    #[test]
+    fn a_zeroing_at_a_home_that_cannot_be_read_is_told_and_any_other_is_not() {
+        for (source, words) in [(HomeSource::Damaged, "damaged"), (HomeSource::Foreign, "another")] {
+            let told = doubtful_zero(source).unwrap_or_default();
+            assert!(told.contains("at another home than its own: ") && told.contains(words), "{told}");
+            assert!(told.ends_with("`tactus calibrate show`"), "{told}");
+        }
+        assert_eq!([HomeSource::Model, HomeSource::Stored].map(doubtful_zero), [None, None]);
+    }
 }

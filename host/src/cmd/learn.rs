@@ -24,6 +24,9 @@ const SLOW_EXTENT: f64 = 0.02;
 /// Usual speed below which the arm counts as still, m/s.
 const STILL_SPEED: f64 = 0.005;
 
+/// Usual fractions of the duration between which the fingers move.
+const HAND_WINDOW: [f64; 2] = [0.6, 1.0];
+
 /// Options of `learn`.
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
@@ -52,7 +55,7 @@ pub struct Cmd {
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR", allow_hyphen_values = true)]
     pub speed: f64,
     /// Learn the whole recording, with the time in which the arm stands still
-    #[arg(long)]
+    #[arg(long, conflicts_with = "still_speed")]
     pub no_trim: bool,
     /// Hand at the start: spread and fingers 1 to 3, rad
     #[arg(long, value_name = "S,F1,F2,F3", default_value = "0,0,0,0", value_parser = hand, allow_hyphen_values = true)]
@@ -63,14 +66,14 @@ pub struct Cmd {
     /// Rest at the goal behind the movement, s: time for the fingers to close
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_hyphen_values = true)]
     pub dwell: f64,
-    /// Fractions of the duration, the dwell included, between which the fingers move
-    #[arg(long, value_name = "BEGIN,END", default_value = "0.6,1", value_parser = numbers::<2>)]
-    pub hand_window: [f64; 2],
+    /// Fractions of the duration, the dwell included, between which the fingers move [default: 0.6,1]
+    #[arg(long, value_name = "BEGIN,END", value_parser = numbers::<2>, allow_hyphen_values = true)]
+    pub hand_window: Option<[f64; 2]>,
     /// Spring K of the position [default: 400 for 12 s, growing with the square of the duration, at least 200]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", allow_hyphen_values = true)]
     pub stiffness: Option<f64>,
     /// Spring K of the orientation [default: 200 for 12 s, likewise]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", allow_hyphen_values = true)]
     pub orientation_stiffness: Option<f64>,
     /// Sensitivity K1 to forces (position, world axes) and torques (rotation, hand axes), optionally spread and fingers
     /// [default: 0.8 K in the horizontal, 3.7 K about the vertical at the goal, fingers 0.3 K]
@@ -101,7 +104,16 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         None => file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
     };
     if let Err(error) = link::Name::new(&name) {
+        if command.name.is_none() {
+            // A place that is none for a file has no name to give either.
+            drop(files::create(&file, global, &[&command.demonstration], "learn")?);
+        }
         return Err(Failure::new(ErrorCode::NameInvalid, format!("learn: the name `{name}`"), error));
+    }
+    if command.hand_window.is_some() && command.hand_start == command.hand_goal {
+        let cause = "--hand-window: the fingers do not move, from `--hand-start` to `--hand-goal` there is no way";
+        return Err(Failure::new(ErrorCode::LearnOption, "learn refused", cause)
+            .help("give the fingers another end with `--hand-goal`, or leave `--hand-window` out"));
     }
     let options = LearnOptions {
         name,
@@ -115,7 +127,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             OrientationError::Quaternion
         },
         dwell: command.dwell,
-        hand: HandMotion { start: command.hand_start, goal: command.hand_goal, window: command.hand_window.into() },
+        hand: HandMotion {
+            start: command.hand_start,
+            goal: command.hand_goal,
+            window: command.hand_window.unwrap_or(HAND_WINDOW).into(),
+        },
         feedback: FeedbackOptions {
             stiffness: command.stiffness,
             orientation_stiffness: command.orientation_stiffness,

@@ -46,6 +46,7 @@ pub mod statistics;
 pub mod status;
 pub mod stop;
 mod storage;
+mod swallowed;
 pub mod tare;
 pub mod teach;
 pub mod upload;
@@ -136,6 +137,16 @@ impl Global {
     fn forgets(&self) -> bool {
         let address = self.device.as_deref().map(str::parse::<Address>);
         matches!(address, Some(Ok(Address::Simulated(_, options))) if options.flash.is_none())
+    }
+
+    /// Says that what the device has just been told to keep is gone with the command, where it is.
+    fn tell_forgotten(&self) {
+        if self.forgets() {
+            self.output().say(
+                "this simulated device ends with the command, and what it keeps with it: `flash=FILE` in its address \
+                 keeps it, `tactus sim` serves one that stays",
+            );
+        }
     }
 
     /// The address that the options name, if any.
@@ -405,13 +416,19 @@ fn tell(failure: &Failure, json: bool) -> ExitCode {
 /// Says what is wrong with the command line, or shows the help or version that was asked for; gives the exit code of
 /// the process. With `--json` anywhere on the line the error is an object too.
 pub fn usage(error: &clap::Error) -> ExitCode {
-    let wants_json = std::env::args_os().any(|argument| argument == "--json");
+    let words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    let wants_json = words.iter().any(|word| word == "--json");
+    let hint = swallowed::hint(error, &words);
     if error.use_stderr() && wants_json {
         let failure = Failure::new(ErrorCode::CommandLine, "tactus", reason(&error.render().to_string()));
+        let failure = hint.iter().cloned().fold(failure, Failure::help);
         // Nobody may be there any more to read it.
         let _ = writeln!(std::io::stdout(), "{}", failure.to_json());
     }
     let shown = error.print();
+    if let Some(hint) = hint {
+        let _ = writeln!(std::io::stderr(), "  help: {hint}");
+    }
     if !error.use_stderr()
         && let Err(failure) = output::written(shown)
     {

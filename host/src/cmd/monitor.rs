@@ -34,7 +34,7 @@ pub struct Cmd {
     #[arg(long, short, value_name = "PRIMITIVE")]
     pub primitive: Option<PathBuf>,
     /// End after this time, s
-    #[arg(long, value_name = "SECONDS", value_parser = teach::duration)]
+    #[arg(long, value_name = "SECONDS", value_parser = teach::duration, allow_hyphen_values = true)]
     pub duration: Option<f64>,
 }
 

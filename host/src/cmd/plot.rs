@@ -219,6 +219,17 @@ pub(super) fn same_movement(file: &PrimitiveFile, recording: &Recording, doing: 
     Err(Failure::new(ErrorCode::RecordingOfOthers, doing, text))
 }
 
+/// Refuses two recordings that say which movement they show, and show different ones.
+pub(super) fn same_as(one: &Recording, other: &Recording, doing: &str) -> Result<(), Failure> {
+    if !one.origin.contradicts(&other.origin) {
+        return Ok(());
+    }
+    let name = |recording: &Recording| recording.origin.primitive.as_ref().map(ToString::to_string).unwrap_or_default();
+    let (first, second) = (one.file.display(), other.file.display());
+    let text = format!("{first} shows the movement {}, {second} shows {}", name(one), name(other));
+    Err(Failure::new(ErrorCode::RecordingOfOthers, doing, text))
+}
+
 /// Renders the scene at the end of the run, the way of the grasp point, and ghosts of the arm along it.
 #[cfg(feature = "mujoco")]
 fn picture(run: &Recording, file: &std::path::Path) -> Result<(), Failure> {

@@ -18,7 +18,13 @@ pub struct Cmd {
     #[arg(long, short, value_name = "FILE", default_value = "recording.csv")]
     pub output: PathBuf,
     /// Duration, s
-    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = teach::recorded)]
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value = "10",
+        value_parser = teach::recorded,
+        allow_hyphen_values = true
+    )]
     pub duration: f64,
 }
 

@@ -21,6 +21,7 @@ use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsal
 use lab::output_file::OutputFile;
 use lab::primitive_file::{LARGEST_DURATION_DEVIATION, PrimitiveFile};
 use lab::procedure::{self, CHANNELS, FlagCounts, Mode, ProcedureError, recording_text};
+use lab::simulation::WorldKind;
 use lab::tracking::Tracking;
 
 const DOING: &str = "rehearse";
@@ -35,7 +36,7 @@ pub struct Cmd {
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=50))]
     pub trials: u8,
     /// Speed relative to the taught one, 0.1 to 2
-    #[arg(long, default_value_t = 1.0, value_parser = super::check::factor)]
+    #[arg(long, default_value_t = 1.0, value_parser = super::check::factor, allow_hyphen_values = true)]
     pub speed: f64,
     /// Where the primitive with its expectation goes, without statistics [default: back into PRIMITIVE]
     #[arg(long, short, value_name = "FILE")]
@@ -52,9 +53,9 @@ pub struct Cmd {
     /// I have brought the arm to its home pose: zero it there if need be
     #[arg(long)]
     pub at_home: bool,
-    /// Surroundings of a simulated arm
-    #[arg(long, value_enum, default_value_t)]
-    pub surroundings: Surroundings,
+    /// Surroundings of a simulated arm [default: table]
+    #[arg(long, value_enum)]
+    pub surroundings: Option<Surroundings>,
 }
 
 /// Surroundings of a simulated arm while it rehearses.
@@ -108,7 +109,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output_file = memory_target(&target, &command.primitive, &[], global, DOING)?;
     let mut records = record_files(command, &file.name, global)?.into_iter();
     let started = Instant::now();
-    let mut client = connection::open(global, DOING, |options| surround(options, command.surroundings))?;
+    let mut client = open(command, global)?;
     // The file keeps what it remembers; of any other version the device may have the only copy.
     let other = upload::other_version(&mut client, &movement, DOING)?;
     if let Some(old) = other.filter(|old| !is_image_of(&file, old)) {
@@ -124,8 +125,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let notes = format!("Tactus recording of a rehearsal of '{}', {} Hz\n{origin}", movement.name, control::RATE_HZ);
     // The same gains and the same pose feedback as in the runs that will compare themselves with this one.
     let options = RunOptions { speed: command.speed as f32, ..Mode::OpenLoop.options() };
-    let mut recordings = Vec::new();
-    let mut flags = Vec::new();
+    let (mut recordings, mut flags) = (Vec::new(), Vec::new());
     for trial in 1..=command.trials {
         let bar = output.bar((file.movement.duration / command.speed).ceil() as u64, "s", "to the start");
         let once = Trial { movement: &movement, options, notes: &notes, path: path_of(command, &file.name, trial) };
@@ -134,7 +134,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             bar.set_position((samples as f64 / RATE) as u64);
         });
         bar.finish_and_clear();
-        let (recording, seen) = played?;
+        let (recording, seen) = played.inspect_err(|_| tell_unkept(command, output))?;
         recordings.push(recording);
         flags.push(seen);
     }
@@ -150,12 +150,13 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         command.payload.unwrap_or_default(),
         !command.equal_weights,
     )
+    .inspect_err(|_| tell_unkept(command, output))
     .map_err(|cause| memory_failure(cause, "rehearse: no expectation was stored"))?;
     let is_changed = target == command.primitive && std::fs::read(&target).ok() != before;
     if is_changed {
         return Err(keep_beside(&file, output_file, &target)?);
     }
-    write(&file, output_file, &target, DOING)?;
+    write(&file, output_file, &target, DOING).inspect_err(|_| tell_unkept(command, output))?;
     output.say(format!("wrote {}", target.display()));
     if !global.forgets() {
         let upload = format!("tactus upload {}", quoted::path(&target));
@@ -173,6 +174,33 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         gaps,
     };
     output.result(&report, report.to_text())
+}
+
+/// Opens the device, with the surroundings that are asked for. Surroundings that it does not have are refused: what is
+/// remembered would not be what was asked for, and nobody would know.
+fn open(command: &Cmd, global: &Global) -> Result<Client<Device>, Failure> {
+    let mut world = None;
+    let client = connection::open(global, DOING, |options| {
+        world = Some(options.world);
+        surround(options, command.surroundings.unwrap_or_default());
+    })?;
+    let lacks = match (command.surroundings, world) {
+        (None, _) | (_, Some(WorldKind::Mujoco)) | (Some(Surroundings::Nothing), Some(WorldKind::Simple)) => false,
+        (Some(_), _) => true,
+    };
+    if lacks {
+        let cause = "`--surroundings` is for an arm that is simulated in this process, with the MuJoCo world";
+        return Err(Failure::new(ErrorCode::CommandLine, "rehearse refused", cause)
+            .help("leave it out: the arm rehearses among what stands around it; `--device sil:` has such a world"));
+    }
+    Ok(client)
+}
+
+/// Says that a rehearsal which ends without a result leaves no recording either, where none was asked for.
+fn tell_unkept(command: &Cmd, output: Output) {
+    if command.record_dir.is_none() {
+        output.say("nothing that was measured is kept; `--record-dir FOLDER` keeps each trial, as far as it came");
+    }
 }
 
 /// One trial of a rehearsal.

@@ -43,10 +43,15 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     };
     let primitive = command.primitive.as_deref().map(|path| super::check::read(path, DOING)).transpose()?;
     let read = |file: &PathBuf| ReportedRun::read(file, primitive.as_ref()).map_err(invalid);
-    let runs = command.runs.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    let given = once_each(&command.runs, global);
+    let mut runs = given.iter().copied().map(read).collect::<Result<Vec<_>, _>>()?;
+    tell_apart(&mut runs, &given);
     if let Some(file) = &primitive {
         runs.iter().try_for_each(|run| plot::same_movement(file, &run.running, "report refused"))?;
     }
+    // A recording that does not name its movement contradicts none.
+    let named: Vec<_> = runs.iter().map(|run| &run.running).filter(|run| run.origin.primitive.is_some()).collect();
+    named.iter().try_for_each(|run| plot::same_as(named[0], run, "report refused"))?;
     for run in runs.iter().filter(|run| run.runs > 1) {
         global.output().warn(format!("{} holds {} runs: the last one is taken", run.name, run.runs));
     }
@@ -61,6 +66,32 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         &Reported { file: files::text(&command.output), runs: outcomes },
         format!("{}\nwrote {}", lines.join("\n"), command.output.display()),
     )
+}
+
+/// The recordings, each once, by whatever names: a line that hides another would look like two equal runs.
+fn once_each<'a>(given: &'a [PathBuf], global: &Global) -> Vec<&'a PathBuf> {
+    let mut places = Vec::new();
+    let is_new = |file: &&PathBuf| {
+        let place = file.canonicalize().unwrap_or_else(|_| PathBuf::clone(file));
+        let is_new = !places.contains(&place);
+        if is_new {
+            places.push(place);
+        } else {
+            global.output().warn(format!("{} is given twice: it is drawn once", file.display()));
+        }
+        is_new
+    };
+    given.iter().filter(is_new).collect()
+}
+
+/// Names recordings by their paths where two have the same name, as those in folders of `tactus run --keep` have.
+fn tell_apart(runs: &mut [ReportedRun], files: &[&PathBuf]) {
+    let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
+    for (run, file) in runs.iter_mut().zip(files) {
+        if names.iter().filter(|name| **name == run.name).count() > 1 {
+            run.name = files::text(file);
+        }
+    }
 }
 
 /// Data of `tactus --json report`.

@@ -45,7 +45,7 @@ pub struct Cmd {
     #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "runs", conflicts_with = "record")]
     pub keep: Option<PathBuf>,
     /// Speed relative to the taught one, 0.1 to 2
-    #[arg(long, default_value_t = 1.0, value_parser = super::check::factor)]
+    #[arg(long, default_value_t = 1.0, value_parser = super::check::factor, allow_hyphen_values = true)]
     pub speed: f64,
     /// Another goal of the grasp point, world frame, m
     #[arg(long, value_name = "X,Y,Z", value_parser = super::learn::numbers::<3>, allow_hyphen_values = true)]
@@ -108,20 +108,23 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Some(client) => client,
         None => open(command, global)?,
     };
-    put(command, &mut client, &file, output)?;
     let Cmd { speed, goal, mode, .. } = *command;
     let asked = Asked { file: &file, speed, goal, mode, check: &check };
     if command.dry_run {
+        put(command, &mut client, &file, output)?;
         return tell_unmoved(&mut client, &asked, output);
     }
     let folder = command.keep.as_ref().map(|base| RunFolder::create(base, &file)).transpose()?;
-    let record = match &folder {
-        Some(folder) => Some(create(&folder.recording())?),
-        None => record,
+    let sent = match &folder {
+        Some(folder) => create(&folder.recording()).map(Some),
+        None => Ok(record),
     };
+    let sent = sent.and_then(|record| put(command, &mut client, &file, output).map(|()| record));
+    let record = sent.inspect_err(|_| folder.iter().for_each(RunFolder::discard))?;
     let mut ended = carry_out(command, &mut client, &asked, record, started, global);
     if let Some(lost) = ended.as_ref().ok().and_then(|report| report.tracking.as_ref()?.missed()) {
-        ended = ended.and_then(|report| Err(short_of_goal(&report, lost, global)?));
+        let recording = folder.as_ref().map(RunFolder::recording).or_else(|| command.record.clone());
+        ended = ended.and_then(|report| Err(short_of_goal(&report, lost, recording.as_deref(), global)?));
     }
     ended = ended.map_err(|failure| connection::afterwards(failure, global));
     if let Some(folder) = folder {
@@ -185,8 +188,15 @@ fn carry_out(
 }
 
 /// The failure of a run that ended elsewhere than at its goal.
-fn short_of_goal(report: &Report, missed: Missed, global: &Global) -> Result<Failure, Failure> {
-    with_result(Failure::new(ErrorCode::GoalMissed, DOING, missed), report, global)
+fn short_of_goal(report: &Report, missed: Missed, record: Option<&Path>, global: &Global) -> Result<Failure, Failure> {
+    let help = match record {
+        Some(file) => {
+            let (from, to) = (quoted::path(file), quoted::path(&file.with_extension("png")));
+            format!("`tactus plot --run {from} --output {to}` shows where it went")
+        }
+        None => "`--record FILE` keeps the next run, and `tactus plot` shows where it went".to_owned(),
+    };
+    with_result(Failure::new(ErrorCode::GoalMissed, DOING, missed).help(help), report, global)
 }
 
 /// A failure behind a run that was played to its end; its report is told all the same.
@@ -366,8 +376,11 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
         .help(help));
     };
     let primitive = file.to_primitive().map_err(|cause| super::check::failure(cause, &file.file, "run"))?;
-    let relative = expectation.recorded_duration / (file.movement.duration / command.speed);
-    let trust = primitive.expected().map_or(0.0, |expected| expected.trust(relative));
+    let trusted = |speed: f64| {
+        let relative = expectation.recorded_duration / (file.movement.duration / speed);
+        primitive.expected().map_or(0.0, |expected| expected.trust(relative))
+    };
+    let trust = trusted(command.speed);
     if trust <= 0.0 {
         return Err(Failure::new(
             ErrorCode::ExpectationSpeed,
@@ -385,6 +398,13 @@ fn check_expectation(file: &PrimitiveFile, command: &Cmd, output: Output) -> Res
             "the expectation was recorded at another speed: the adaptation is derated to {:.0} %",
             trust * 100.0
         ));
+    }
+    for (time, speed) in command.speed_at.iter().filter_map(|change| Some((change.time, change.speed()?))) {
+        let trust = trusted(speed);
+        if trust < 1.0 {
+            let share = trust * 100.0;
+            output.warn(format!("from {time} s on, at speed {speed:.2}, the adaptation is derated to {share:.0} %"));
+        }
     }
     if expectation.payload_mass > 0.0 {
         output.say(format!("expects the load it was rehearsed with: {:.3} kg", expectation.payload_mass));

@@ -44,6 +44,13 @@ impl RunFolder {
         Ok(Self { path, primitive: primitive.clone() })
     }
 
+    /// Takes away the folder of a run that did not begin.
+    pub(super) fn discard(&self) {
+        let _ = fs::remove_file(self.path.join("primitive.toml"));
+        // What somebody else has put there stays.
+        let _ = fs::remove_dir(&self.path);
+    }
+
     /// Where it is.
     pub(super) fn path(&self) -> &Path {
         &self.path

@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Failure, Global, connection, files};
+use crate::quoted;
 use lab::error::HostError;
 
 /// Options of `secret`.
@@ -77,7 +78,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             let mut client = connection::open_to_change_secret(global, DOING)?;
             client.keep_secret(&secret).map_err(failed)?;
             client.unlock(&secret).map_err(failed)?;
-            global.output().say(format!("from now on: `--secret-file {0}`, or TACTUS_SECRET_FILE={0}", file.display()));
+            let word = quoted::path(file);
+            global.output().say(format!("from now on: `--secret-file {word}`, or TACTUS_SECRET_FILE={word}"));
+            global.tell_forgotten();
             tell(&client.secret().map_err(failed)?, global)
         }
         Action::Clear => {

@@ -199,7 +199,9 @@ fn restore(path: &Path, global: &Global) -> Result<(), Failure> {
     let serial = client.hello().serial.as_str().to_owned();
     if serial != file.serial && !global.force {
         let what = format!("{} is of the device '{}', this is '{serial}'", path.display(), file.serial);
-        return Err(Failure::new(ErrorCode::SettingsOfOthers, DOING, what));
+        let again = format!("`tactus config restore {} --force`", quoted::path(path));
+        return Err(Failure::new(ErrorCode::SettingsOfOthers, DOING, what)
+            .help(format!("calibrate this arm; if it is the same arm with another board: {again}")));
     }
     write(&mut client, &before, &after, missing, global, DOING)
 }
@@ -254,6 +256,7 @@ fn write(
     if data.changes.is_empty() {
         return global.output().result(&data, format!("nothing to change{}", rest(&data)));
     }
+    global.tell_forgotten();
     let text = format!("{}stored in the device, and read back{}", table(&data, "before", "now"), rest(&data));
     global.output().result(&data, text)
 }

@@ -45,7 +45,7 @@ pub struct Cmd {
     #[arg(long, value_name = "ADDRESS", default_value = "unix:tactus.sock")]
     pub listen: String,
     /// End after this much virtual time, s
-    #[arg(long, value_name = "SECONDS", value_parser = super::teach::duration)]
+    #[arg(long, value_name = "SECONDS", value_parser = super::teach::duration, allow_hyphen_values = true)]
     pub duration: Option<f64>,
     /// While nobody is connected, do not wait for the wall clock: run as fast as this machine can
     #[arg(long)]

@@ -19,7 +19,7 @@ use lab::startup_guide::blocked_remedy;
 #[derive(Debug, Clone, Args)]
 pub struct Cmd {
     /// Look at the bus and the line for so many seconds: complete cycles, gaps, times of answers, who was late
-    #[arg(long, value_name = "SECONDS", value_parser = crate::config::seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = crate::config::seconds, allow_hyphen_values = true)]
     pub line: Option<Duration>,
 }
 

@@ -33,7 +33,7 @@ pub struct Cmd {
     #[arg(long, value_name = "Q1,...,Q7", value_parser = start_posture, allow_hyphen_values = true)]
     pub from: Option<Posture>,
     /// Duration of the recording, s. Without it: until Enter is pressed, at most 120, or a simulated teacher lets go
-    #[arg(long, value_name = "SECONDS", value_parser = recorded)]
+    #[arg(long, value_name = "SECONDS", value_parser = recorded, allow_hyphen_values = true)]
     pub duration: Option<f64>,
     /// I have brought the arm to its home pose: zero it there if need be
     #[arg(long)]

@@ -66,6 +66,7 @@ pub(super) fn run(command: &Gravity, client: &mut Client<Device>, global: &Globa
     });
     report.write("gravity", kept.is_ok(), &data(&weighing), global)?;
     kept?;
+    global.tell_forgotten();
     let text =
         format!("{}accepted, stored in the device; it takes effect when the arm next has no torque", table(&weighing));
     global.output().result(&data(&weighing), text)

@@ -13,6 +13,7 @@ use crate::law::spring::{LET_GO, reach};
 use crate::law::support::Support;
 use crate::model::friction;
 use crate::plan::approach::Approach;
+use crate::plan::lift::Lift;
 use crate::plan::reference::JointReference;
 use crate::real::{Real, at_least, at_most, sqrt, within};
 use crate::sense::drift::Drift;
@@ -210,6 +211,8 @@ pub(super) struct Running<R: Real> {
     pub(super) pressing: Vector7<R>,
     /// Keeps a compliant arm that touches nothing on its plan, against friction and the error of the model.
     pub(super) settling: Settling<R>,
+    /// Height to which a grip has been raised, and its load.
+    pub(super) lift: Lift<R>,
 }
 
 /// The tool against the plan in the last cycle.

@@ -97,7 +97,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Law::Run(_) => holds(self.gains.tracking(self.run.as_ref().is_some_and(|run| run.options.compliant))),
             _ => (Vector7::zeros(), Vector7::zeros()),
         };
-        self.bounds.repulsion(&measured.state.q, &self.observer.velocity(measured.state, Trust::Stiff), &held)
+        self.bounds.repulsion(
+            &measured.state.q,
+            &self.observer.velocity(measured.state, Trust::Stiff, &Vector7::zeros()),
+            &held,
+        )
     }
 
     fn plain(&self, measured: &Measured<'_, R>, torque: Vector7<R>) -> Demand<R> {
@@ -132,7 +136,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let (light, full) = (&self.gains.lead_damping, &self.gains.stop_damping);
         let share = at_most(at_least(share, R::constant(0.0)), R::constant(1.0));
-        torque -= (light + (full - light) * share).component_mul(&self.observer.velocity(measured.state, Trust::Stiff));
+        torque -= (light + (full - light) * share).component_mul(&self.observer.velocity(
+            measured.state,
+            Trust::Stiff,
+            &Vector7::zeros(),
+        ));
         Demand { explained: (gravity, Vector7::zeros()), ..self.plain(measured, torque) }
     }
 
@@ -186,7 +194,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         let load = support.torque(measured.frames);
         let gravity = self.steady_gravity(measured);
-        let velocity = self.observer.velocity(measured.state, Trust::Stiff);
+        let velocity = self.observer.velocity(measured.state, Trust::Stiff, &Vector7::zeros());
         let damping = self.gains.stop_damping.component_mul(&velocity);
         let demand = self.plain(measured, gravity * share + rest + load - damping);
         Demand { explained: (gravity, Vector7::zeros()), ..demand }
@@ -209,7 +217,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let shifted = JointReference { q: JointPositions(reference.q.0 + posture.integral.shift()), ..reference };
         let trust = if posture.approach.is_some() { Trust::Approach } else { Trust::Stiff };
-        let velocity = self.observer.velocity(measured.state, trust);
+        let velocity = self.observer.velocity(measured.state, trust, &reference.dq.0);
         let mut torque = posture.controller.torque(
             &self.model,
             &self.gains.stiff,
@@ -243,7 +251,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             // A run begins with a primitive, and no other is loaded meanwhile; else the arm floats.
             return self.float(measured);
         };
-        let Running { operational, controller, handover, leaning, lag, drift, pressing, settling } = running;
+        let Running { operational, controller, handover, leaning, lag, drift, pressing, settling, lift } = running;
         let (options, tracking) = (run.options, self.gains.tracking(run.options.compliant));
         let hand = self.hand.answering().filter(|hand| hand.feels());
         let gauges = hand.map(|hand| &hand.gauges);
@@ -263,6 +271,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             deviation.map(|deviation| deviation.expected_gauges),
         );
         let task = TaskReference::from_plan(&plan);
+        let grips = options.compliant && grasp == Grasp::Gripping;
+        operational.keep(lift.step(&task, grips, deviation.as_ref()));
         let how = (options.pose_feedback, options.acceleration);
         let reference = operational.step(&self.model, tracking, measured.frames, measured.state, &task, how);
         if run.goal_moves() {
@@ -270,7 +280,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             let behind = lag.distance * R::constant(1.0 / TRACKING_LIMIT);
             run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
         }
-        let velocity = self.observer.velocity(measured.state, Trust::of_run(options.compliant));
+        let velocity = self.observer.velocity(measured.state, Trust::of_run(options.compliant), &reference.dq.0);
         let mut torque =
             controller.torque(&self.model, tracking, measured.frames, measured.state, &velocity, &reference);
         let explained = (torque.0 - controller.feedback(), reference.ddq.0);
@@ -296,14 +306,15 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         set |= if surprise > R::constant(1.0) { flags::SURPRISE } else { 0 };
         set |= if run.is_faded(primitive) { flags::FEEDBACK_FADED } else { 0 };
         set |= if operational.is_clamped() { flags::CLAMPED } else { 0 };
-        let free = senses == Senses::Fresh && drift.is_free() && !self.cut.is_cut();
+        let steady = senses == Senses::Fresh && !self.cut.is_cut();
         // The sensor measures a throw, too: inertia of the hand. So what is drawn is let go of until it is relaxed.
         let lets_go = operational.is_drawn() || drift.is_free() || !(options.feedback || options.force_control);
         let drawn = lets_go && operational.let_go(measured.state, &reference.planned, &tracking.clamp);
         if options.compliant {
-            if grasp == Grasp::Gripping || drawn {
+            let settles = steady && if grips { lift.carries() } else { drift.is_free() };
+            if drawn || (grips && !settles) {
                 settling.fade();
-            } else if free {
+            } else if settles {
                 settling.step(&tracking.stiffness, measured.state, &reference, |joint| handover.fall(joint));
             } else if drift.is_touched() {
                 settling.give_way(pressing);

@@ -12,6 +12,7 @@ use crate::law::operational::OperationalController;
 use crate::law::settling::Settling;
 use crate::law::support::Support;
 use crate::plan::approach::Approach;
+use crate::plan::lift::Lift;
 use crate::plan::primitive::Primitive;
 use crate::real::{Real, within};
 use crate::sense::deviation::Deviation;
@@ -127,13 +128,14 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             drift: Drift::new(),
             pressing: Vector7::zeros(),
             settling: Settling::new(),
+            lift: Lift::new(),
         });
     }
 
     /// The posture to hold after a run: what Eq (11) has put between q_d and q against friction becomes the integral's.
     fn after_run(&self, measured: &Measured<'_, R>) -> Posture<R> {
         let stiff = &self.gains.stiff;
-        let velocity = self.observer.velocity(measured.state, Trust::Stiff);
+        let velocity = self.observer.velocity(measured.state, Trust::Stiff, &Vector7::zeros());
         let friction = match &self.law {
             Law::Run(Running { controller, .. }) => *controller.friction(),
             _ => Vector7::zeros(),

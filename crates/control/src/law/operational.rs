@@ -45,6 +45,8 @@ pub struct OperationalController<R: Real> {
     /// The joint whose turn it is to be looked at.
     turn: u8,
     lag: R,
+    /// The planned posture goes nowhere by itself.
+    keeps: bool,
 }
 
 impl<R: Real> OperationalController<R> {
@@ -58,6 +60,7 @@ impl<R: Real> OperationalController<R> {
             drawn: 0,
             turn: 0,
             lag: R::constant(0.0),
+            keeps: false,
         }
     }
 
@@ -74,6 +77,12 @@ impl<R: Real> OperationalController<R> {
     /// True while a spring that something has drawn is let go of.
     pub fn is_drawn(&self) -> bool {
         self.drawn != 0
+    }
+
+    /// Leaves the planned posture where the plan of the tool keeps it, from the next tick on, or lets it go on towards
+    /// the one that is preferred: friction holds some of its joints, and the others push the hand aside.
+    pub fn keep(&mut self, keeps: bool) {
+        self.keeps = keeps;
     }
 
     /// Speed of the tool against that of the plan in the last tick (m/s).
@@ -117,7 +126,7 @@ impl<R: Real> OperationalController<R> {
             PoseFeedback::Measured => &state.q.0,
             PoseFeedback::Planned => &self.q_d.0,
         };
-        let preferred = (task.posture - posture) * gains.posture;
+        let preferred = (task.posture - posture) * if self.keeps { R::constant(0.0) } else { gains.posture };
         let dq_d = inverse.resolve(&(task.velocity + correction), &preferred);
 
         // An error of the measured pose is closed against friction. Where the plan alone moves the joints, feedback
@@ -244,5 +253,35 @@ mod tests {
     fn against_a_joint_that_friction_holds_the_measured_posture_goes_on() {
         let away = led_away(PoseFeedback::Measured);
         assert!(away > 0.1, "{away} rad");
+    }
+
+    /// The change that makes it fail: a posture that is kept goes on towards the one that is preferred. 0.1 rad then.
+    #[test]
+    fn a_posture_that_is_kept_goes_nowhere_and_one_that_is_not_goes_where_it_is_preferred() {
+        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+        let posture = JointPositions::from_array([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]);
+        let frames = Frames::new(&model, &posture);
+        let mut preferred = posture.0;
+        preferred[4] += 0.3;
+        let task = TaskReference {
+            pose: frames.tool_pose(),
+            velocity: Vector6::zeros(),
+            acceleration: Vector6::zeros(),
+            posture: preferred,
+            posture_velocity: Vector7::zeros(),
+        };
+        let state = JointState::whole(posture, JointVelocities::zero());
+        let gains = Gains::tuned().compliant;
+        let moved = |keeps| {
+            let mut controller = OperationalController::new(posture);
+            controller.keep(keeps);
+            for _ in 0..900 {
+                let how = (PoseFeedback::Planned, AccelerationSource::Analytic);
+                controller.step(&model, &gains, &frames, &state, &task, how);
+            }
+            (controller.q_d().0 - posture.0).amax()
+        };
+        let (kept, led) = (moved(true), moved(false));
+        assert!(kept < 1e-9 && led > 0.05, "{kept} rad, {led} rad");
     }
 }

@@ -13,7 +13,7 @@
 //! While something is touched it grows no more: there the feedback decides how hard. From a touch on, the torque of a
 //! joint that presses against what the sensor measures is given up, because friction that was made up for along a plan
 //! is not there once the plan is stopped. Once the hand grips, it fades: with what it holds the arm turns round, and
-//! friction with it.
+//! friction with it. What is raised and weighs what was expected (`plan::lift`) is no touch any more.
 
 use crate::law::integral::TOLERANCE;
 use crate::model::wam7;

@@ -39,7 +39,7 @@ const DRIFT: f64 = 1.0;
 pub const REST_FORCE: f64 = 5.0;
 
 /// Part of the sensor's range from which on a sample counts as full scale.
-const FULL_SCALE: f64 = 0.99;
+pub const FULL_SCALE: f64 = 0.99;
 
 /// Largest force that a frame can carry (N).
 const LARGEST_FORCE: f64 = 32_767.0 / 256.0;

@@ -55,6 +55,8 @@ pub(crate) enum Law {
         compliant: bool,
         feedback: bool,
         force: bool,
+        /// The pose that is fed back is the measured one.
+        measured: bool,
     },
 }
 
@@ -144,7 +146,7 @@ fn settled(gains: &Gains<f64>, law: Law, q: [f64; 7], variation: Variation, push
             arm.command(Command::Approach { q: target, duration: 30.0 });
             arm.run_for(3.0);
         }
-        Law::Run { compliant, feedback, force } => {
+        Law::Run { compliant, feedback, force, measured } => {
             arm.command(Command::Tare);
             while arm.number < 3000 && arm.tick(None).record.dq.iter().any(|v| v.abs() > 0.02) {}
             if arm.cycle.fault() != control::Fault::None {
@@ -159,7 +161,7 @@ fn settled(gains: &Gains<f64>, law: Law, q: [f64; 7], variation: Variation, push
                 feedback,
                 force_control: force,
                 compliant,
-                pose_feedback: PoseFeedback::Planned,
+                pose_feedback: if measured { PoseFeedback::Measured } else { PoseFeedback::Planned },
                 finger_feedback: false,
                 ..RunOptions::default()
             }));
@@ -272,6 +274,51 @@ pub(crate) fn shake(gains: &Gains<f64>, q: [f64; 7], strong: f64) -> Option<Stop
         }
     }
     None
+}
+
+/// A fast move from one posture to another, kicked on its way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Move {
+    pub(crate) from: [f64; 7],
+    pub(crate) to: [f64; 7],
+    /// When it is kicked (s after its beginning).
+    pub(crate) kicked: f64,
+}
+
+/// Speeds of the motors in a move, from the kick on; `None`: a monitor stopped the arm.
+fn on_the_way(place: &Move, variation: Variation, kick: f64) -> Option<Vec<Vector7<f64>>> {
+    let plant = Plant::new(place.from, variation);
+    let Ok(cycle) = Box::new_uninit().write_init(Cycle::init(plant.calibration(), Gains::tuned()));
+    let mut arm = Loop { cycle, plant, number: 0 };
+    arm.run_for(0.01);
+    arm.command(Command::Hold);
+    arm.run_for(1.0);
+    arm.plant.settle();
+    // As fast as the device allows.
+    arm.command(Command::Approach { q: place.to.map(|q| q as f32), duration: 0.0 });
+    arm.run_for(place.kicked);
+    for (joint, speed) in arm.plant.omega.iter_mut().enumerate() {
+        *speed += if joint % 2 == 0 { kick } else { -kick };
+    }
+    let mut seen = Vec::new();
+    while arm.cycle.state() == State::Approach {
+        arm.tick(None);
+        seen.push(arm.plant.omega);
+    }
+    (arm.cycle.fault() == control::Fault::None).then_some(seen)
+}
+
+/// Largest swing beyond 8 Hz of a motor that a kick leaves in a move, from 0.2 s behind it on, in parts of the kick;
+/// `None`: a monitor stopped the arm.
+pub(crate) fn left_on_the_way(place: &Move, variation: Variation) -> Option<f64> {
+    let (kicked, alone) = (on_the_way(place, variation, KICK)?, on_the_way(place, variation, 0.0)?);
+    let seen: Vec<_> = kicked.iter().zip(&alone).map(|(kicked, alone)| kicked - alone).collect();
+    let half = (0.5 * RATE / 8.0) as usize;
+    let swings = seen.windows(2 * half + 1).skip((0.2 * RATE) as usize).map(|window| {
+        let mean = window.iter().sum::<Vector7<f64>>() / window.len() as f64;
+        window.get(half).map_or(0.0, |omega| (omega - mean).amax())
+    });
+    Some(swings.fold(0.0, f64::max) / KICK)
 }
 
 /// The posture with the joint that is pressed just inside its soft limit.

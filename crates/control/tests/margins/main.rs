@@ -9,7 +9,7 @@ mod plant;
 use std::collections::BTreeSet;
 
 use control::law::Gains;
-use loops::{Law, beyond_limit, kick, shake};
+use loops::{Law, Move, beyond_limit, kick, left_on_the_way, shake};
 use nalgebra::Vector3;
 use plant::{SUBSTEPS, Variation};
 
@@ -40,24 +40,38 @@ const PRESSED: [f64; 7] = [1.0, 1.0, 0.5, 0.5, 0.1, 0.1, 0.03];
 const PUSH: [f64; 3] = [0.8, 0.2, 0.0];
 
 const fn run(compliant: bool, feedback: bool, force: bool) -> Law {
-    Law::Run { compliant, feedback, force }
+    Law::Run { compliant, feedback, force, measured: false }
 }
 
-const LAWS: [(&str, Law); 10] = [
+/// A stiff run with the pose feedback that the host asks for.
+const fn measured(force: bool) -> Law {
+    Law::Run { compliant: false, feedback: false, force, measured: true }
+}
+
+const LAWS: [(&str, Law); 12] = [
     ("hold", Law::Hold),
     ("approach", Law::Approach),
     ("teach", Law::Teach),
     ("soft stop", Law::SoftStop),
     ("run, stiff", run(false, false, false)),
     ("run, stiff, Eq 12", run(false, false, true)),
+    ("run, measured", measured(false)),
+    ("run, measured, Eq 12", measured(true)),
     ("run, compliant", run(true, false, false)),
     ("run, compliant, Eq 8", run(true, true, false)),
     ("run, compliant, Eq 12", run(true, false, true)),
     ("run, compliant, Eqs 8, 12", run(true, true, true)),
 ];
 
+/// Every variation of a law.
+const EVERYTHING: &str = "everything";
+
 /// Loops that do not pass: the law, and the variations. One that passes has to leave the list.
-const OPEN: [(&str, &[&str]); 6] = [
+const OPEN: [(&str, &[&str]); 8] = [
+    // The sign of the friction that is fed forward along what corrects the measured pose: the wrist swings at 10 Hz, on
+    // the nominal arm as well (decision 0144).
+    ("run, measured", &[EVERYTHING]),
+    ("run, measured, Eq 12", &[EVERYTHING]),
     // The integral of the posture, too strong for half the stiffness: J7 swings at 4 Hz.
     ("approach", &["gain x0.5"]),
     // Nothing but gravity torque carries what the arm does not know of: it sinks, and a monitor stops it.
@@ -210,7 +224,7 @@ fn every_loop_that_is_not_listed_is_stable_without_friction_and_every_listed_one
     println!("left of the kick, its joint and frequency, worst pose");
     for (law, (share, words), what) in rows {
         let fails = share > PASSED || share.is_nan();
-        let listed = open.contains(&(law.to_owned(), what.clone()));
+        let listed = [EVERYTHING, &what].iter().any(|what| open.contains(&(law.to_owned(), (*what).to_owned())));
         let mark = if fails { if listed { "open" } else { "FAILS" } } else { "" };
         println!("{law:26} {what:19} {words:32} {mark}");
         if fails != listed {
@@ -242,6 +256,43 @@ fn g10_a_loop_that_shakes_is_stopped_within_half_a_second_by_its_name_and_then_s
         }
     }
     assert!(shook >= 15, "{shook} shook");
+}
+
+/// Moves at full speed: one that shook while a simulated arm was weighed, and those between postures.
+fn moves() -> Vec<Move> {
+    let found = ([-0.41, -0.31, 0.77, 1.86, -1.03, 0.76, 0.0], [0.15, -0.13, 0.03, 0.46, -1.59, -0.64, 0.90]);
+    let between = (0..POSES.len()).map(|at| (POSES[at].1, POSES[(at + 1) % POSES.len()].1));
+    let there = std::iter::once(found).chain(between);
+    let all = there.flat_map(|(from, to)| [(from, to), (to, from)]);
+    all.flat_map(|(from, to)| [0.6, 1.0, 1.4].map(|kicked| Move { from, to, kicked })).collect()
+}
+
+/// A joint that follows a fast plan is not thrown by anybody. Kept within 0.1 rad/s of what is measured, the observed
+/// velocity had the swing of the cables in it: J4 and J5 shook at 37 Hz.
+///
+/// The change that makes it fail: the speed from which a joint is fast is not the one beyond its plan.
+#[test]
+fn g10_an_arm_that_moves_fast_does_not_shake_without_friction() {
+    // Twice the gain would be twice the torque of gravity, which changes on the way.
+    let nominal = Variation::NONE;
+    let variations = [
+        ("nominal", nominal),
+        ("1 cycle late", Variation { delay: SUBSTEPS, ..nominal }),
+        ("cables x0.8", Variation { cables: 0.8, ..nominal }),
+        ("cables x1.2", Variation { cables: 1.2, ..nominal }),
+    ];
+    let (mut wrong, mut worst) = (Vec::new(), 0.0);
+    for (what, variation) in variations {
+        for place in moves() {
+            let left = left_on_the_way(&place, variation);
+            worst = f64::max(worst, left.unwrap_or(f64::INFINITY));
+            if left.is_none_or(|left| left > 2.5) {
+                wrong.push(format!("{what}, {place:?}: {left:?}"));
+            }
+        }
+    }
+    println!("left of the kick on the way: {worst:.3} at most");
+    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), variations.len() * moves().len(), wrong.join("\n"));
 }
 
 #[test]

@@ -89,10 +89,10 @@ enum Step {
     ConfirmIdle { until_us: Option<u64>, rests: bool },
     /// Look whether the arm stands still.
     AwaitRest(Rest),
-    /// IFAULT before positions are rewritten.
-    IgnoreFaults,
-    /// SET P of a puck.
-    WritePosition { joint: u8 },
+    /// IFAULT before positions are rewritten, until this time.
+    IgnoreFaults { until_us: u64 },
+    /// SET P of a puck, until this time.
+    WritePosition { joint: u8, until_us: u64 },
     /// Read the positions back; `until_us` once the request has left.
     CheckPositions { until_us: Option<u64> },
     /// SET ZERO.
@@ -228,6 +228,8 @@ impl Startup {
             tared_anew: self.tared_anew,
             angles: self.angles,
             declared: self.declared,
+            // Given in this very slot, it is told behind it.
+            zero_request: self.zero_request,
             stopping: Some(Stopping::default()),
             continuity: Some(Continuity::since(now_us, last)),
             ..Startup::new()
@@ -292,7 +294,7 @@ impl Startup {
             Step::AwaitZero { .. } | Step::ConfirmIdle { .. } | Step::AwaitRest(_) | Step::RevokeZero { .. } => {
                 Stage::WaitingForZero
             }
-            Step::IgnoreFaults
+            Step::IgnoreFaults { .. }
             | Step::WritePosition { .. }
             | Step::CheckPositions { .. }
             | Step::TellZero
@@ -493,11 +495,14 @@ impl Startup {
             Step::AwaitZero { next_us } => self.await_zero(next_us, outlet),
             Step::ConfirmIdle { until_us, rests } => self.confirm_idle(until_us, rests, outlet),
             Step::AwaitRest(rest) => self.await_rest(rest, outlet),
-            Step::IgnoreFaults => {
-                let frame = set(Node::SAFETY_MODULE, self.safety()?.ignore_faults, IGNORED_AT_ZERO);
-                Ok(after(outlet.send(frame), Step::WritePosition { joint: 0 }))
+            Step::IgnoreFaults { until_us } | Step::WritePosition { until_us, .. } if outlet.now_us() >= until_us => {
+                Err(StartupError::ZeroUnfinished)
             }
-            Step::WritePosition { joint } => Ok(self.write_position(joint, outlet)),
+            Step::IgnoreFaults { until_us } => {
+                let frame = set(Node::SAFETY_MODULE, self.safety()?.ignore_faults, IGNORED_AT_ZERO);
+                Ok(after(outlet.send(frame), Step::WritePosition { joint: 0, until_us }))
+            }
+            Step::WritePosition { joint, until_us } => Ok(self.write_position(joint, until_us, outlet)),
             Step::CheckPositions { until_us } => self.check_positions(until_us, outlet),
             Step::TellZero => {
                 let frame = set(Node::SAFETY_MODULE, self.safety()?.zero, 1);
@@ -527,14 +532,20 @@ impl Startup {
             Step::Done => Ok(Next::Stay),
             Step::Blocked { until_us } if outlet.now_us() < until_us => Ok(Next::Stay),
             Step::Blocked { .. } => {
-                let (error, doubt, hand) = (self.error, self.doubt, self.hand.again());
-                let (continuity, tared, angles, declared) = (self.continuity, self.tared, self.angles, self.declared);
-                let tared_anew = self.tared_anew;
-                *self = Startup { error, doubt, hand, continuity, tared, angles, declared, ..Startup::new() };
-                self.tared_anew = tared_anew;
+                self.try_again();
                 Ok(Next::Stay)
             }
         }
+    }
+
+    /// A start-up that has failed has rested.
+    fn try_again(&mut self) {
+        let (error, doubt, hand) = (self.error, self.doubt, self.hand.again());
+        let (continuity, tared, angles, declared) = (self.continuity, self.tared, self.angles, self.declared);
+        // The answer to a person who wanted to zero in this very slot is told behind it.
+        let (tared_anew, stopping, zero_request) = (self.tared_anew, self.stopping, self.zero_request);
+        *self = Startup { error, doubt, hand, continuity, tared, angles, declared, ..Startup::new() };
+        (self.tared_anew, self.stopping, self.zero_request) = (tared_anew, stopping, zero_request);
     }
 
     /// Asks the safety module if positions count from a known pose.

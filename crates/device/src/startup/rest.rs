@@ -1,6 +1,8 @@
 //! `Rest`: two looks at the arm before it is zeroed. What a person says of an arm that moves is no longer so once it is
 //! written.
 
+use puck::Node;
+
 use super::{Next, Startup, Step};
 use crate::bus::Outlet;
 use crate::stage::StartupError;
@@ -36,6 +38,11 @@ impl Startup {
     /// answer is lost is repeated.
     pub(super) fn await_rest(&mut self, rest: Rest, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
         let (now_us, confirm) = (outlet.now_us(), Step::ConfirmIdle { until_us: Some(rest.deadline_us), rests: true });
+        if rest.until_us.is_none() && now_us >= rest.deadline_us {
+            // Not even the request may have left.
+            let [first, ..] = Node::ARM;
+            return Err(StartupError::NoAnswer(first));
+        }
         if rest.until_us.is_none() && now_us < rest.due_us {
             return Ok(Next::Stay);
         }

@@ -30,20 +30,23 @@ impl Startup {
     }
 
     /// Repeats a stop frame if one is due, for half a second after the cyclic loop: pucks keep the torque they have,
-    /// or the arm falls because nothing brakes it, and a frame can be lost. Ends before a puck is woken, for then
-    /// the bus has to be quiet. True if the slot is used.
+    /// or the arm falls because nothing brakes it, and a frame can be lost. Goes on while a start-up rests that has not
+    /// found the pucks: they may be heard again at any time, with the torque of then. Ends before a puck is woken, for
+    /// then the bus has to be quiet. True if the slot is used.
     pub(super) fn repeats_stop(&mut self, outlet: &mut impl Outlet) -> bool {
-        let (Step::Enumerate { powered: false, .. }
-        | Step::Listen { powered: false, .. }
-        | Step::IdentifySafety { .. }
-        | Step::LoadLimit { .. }
-        | Step::AwaitIdle { .. }) = self.step
-        else {
-            return false;
+        let rests = match self.step {
+            Step::Enumerate { powered: false, .. }
+            | Step::Listen { powered: false, .. }
+            | Step::IdentifySafety { .. }
+            | Step::LoadLimit { .. }
+            | Step::AwaitIdle { .. } => false,
+            Step::Blocked { .. } => true,
+            _ => return false,
         };
         let now_us = outlet.now_us();
         let Some(Stopping { since_us, next_us, frame }) = &mut self.stopping else { return false };
-        if now_us < *next_us || now_us > *since_us.get_or_insert(now_us) + STOPPING_US {
+        let is_over = now_us > *since_us.get_or_insert(now_us) + STOPPING_US && !rests;
+        if now_us < *next_us || is_over {
             return false;
         }
         // The brakes hold whatever the torque is, so their frame goes more often.
@@ -71,6 +74,7 @@ impl Startup {
         let hand_may_come = self.survey.hand_is_partial() && self.enumerations < ENUMERATIONS;
         match self.survey.missing_puck() {
             None if !hand_may_come && !sensor_may_come => {
+                self.stopping = None;
                 self.survey_hand();
                 Ok(Next::Go(Step::Identify { device: 0 }))
             }

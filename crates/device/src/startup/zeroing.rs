@@ -13,6 +13,9 @@ use crate::stage::StartupError;
 /// and two looks, of which some may be lost. A host gives a command up after 200 ms, and an arm must not be zeroed by
 /// one that was given up.
 const CONFIRM_US: u64 = 170_000;
+/// Longest time from the second look until the last position is written, us. It takes 10 to 50 ms; where the bus has no
+/// room for longer the arm may have been activated, and stand elsewhere.
+const WRITE_US: u64 = 100_000;
 /// Longest time for the seven replies to one position request, us.
 const POSITIONS_US: u64 = 10_000;
 /// Largest distance of a puck from the position just written, counts (0.3 rad of a motor, 7 mrad of J1): a braked arm
@@ -83,7 +86,7 @@ impl Startup {
             self.doubt.get_or_insert(StartupError::ZeroUnfinished);
             self.zeroed = false;
             self.zeroed_at = None;
-            return Ok(Next::Go(Step::IgnoreFaults));
+            return Ok(Next::Go(Step::IgnoreFaults { until_us: outlet.now_us() + WRITE_US }));
         }
         if SafetyMode::from_value(mode) == Some(SafetyMode::EStop) {
             self.zero_request = ZeroRequest::Answered(Err(Refusal::ZeroNeedsIdle));
@@ -115,13 +118,13 @@ impl Startup {
         Ok(Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US }))
     }
 
-    /// The pucks have lost power, and with it everything read and written.
+    /// The pucks have lost power, and with it everything read and written. A doubt stays: the word may be wrong.
     fn power_is_off(&mut self) {
-        let (hand, zero_request, declared) = (self.hand.again(), self.zero_request, self.declared);
-        *self = Startup { hand, zero_request, declared, ..Startup::new() };
+        let (hand, zero_request, declared, doubt) = (self.hand.again(), self.zero_request, self.declared, self.doubt);
+        *self = Startup { hand, zero_request, declared, doubt, ..Startup::new() };
     }
 
-    pub(super) fn write_position(&mut self, joint: u8, outlet: &mut impl Outlet) -> Next {
+    pub(super) fn write_position(&mut self, joint: u8, until_us: u64, outlet: &mut impl Outlet) -> Next {
         if self.revocations > 0 {
             self.revoke_zero(outlet);
             return Next::Stay;
@@ -130,7 +133,7 @@ impl Startup {
         match (Node::ARM.get(index), self.targets.get(index)) {
             (Some(node), Some(target)) => {
                 let frame = set(*node, PropertyId::POSITION, target.0);
-                after(outlet.send(frame), Step::WritePosition { joint: joint + 1 })
+                after(outlet.send(frame), Step::WritePosition { joint: joint + 1, until_us })
             }
             _ => Next::Go(Step::CheckPositions { until_us: None }),
         }

@@ -18,6 +18,10 @@ const CHUNK_NOTES: usize = 8;
 /// Begins every note: "TacJ", and the version of the layout of the whole region.
 const MAGIC: [u8; 6] = *b"TacJ\x01\x00";
 
+/// Sound notes that a journal has at least, but while it is begun. Without one the whole region counts as foreign and
+/// is erased: bits that fall over, one after the other in years, must not cost the library.
+const LEAST_NOTES: u32 = 4;
+
 /// Sectors of the journal, the last two of the region.
 pub(super) const SECTORS: u32 = 2;
 
@@ -40,6 +44,8 @@ pub(super) struct Journal {
     half: u32,
     next: u32,
     number: u32,
+    /// Sound notes.
+    sound: u32,
 }
 
 /// Content of the journal at start-up.
@@ -53,7 +59,7 @@ impl Journal {
     /// Reads the journal at `base`. `None`: there is none, the region is not ours.
     pub(super) async fn read<F: NorFlash>(flash: &mut F, base: u32) -> Result<Option<JournalState>, F::Error> {
         let mut newest: Option<(u32, Matter, u32)> = None;
-        let mut ends = [0; SECTORS as usize];
+        let (mut ends, mut sound) = ([0; SECTORS as usize], 0);
         for (half, end) in (0..SECTORS).zip(&mut ends) {
             let start = base + half * sector_bytes::<F>();
             'half: while *end < notes::<F>() {
@@ -64,9 +70,9 @@ impl Journal {
                         break 'half;
                     }
                     *end += 1;
-                    if let Some((number, matter)) = decode(note)
-                        && newest.is_none_or(|(newest, ..)| number > newest)
-                    {
+                    let Some((number, matter)) = decode(note) else { continue };
+                    sound += 1;
+                    if newest.is_none_or(|(newest, ..)| number > newest) {
                         newest = Some((number, matter, half));
                     }
                 }
@@ -75,17 +81,24 @@ impl Journal {
         Ok(newest.map(|(number, matter, half)| {
             let next = ends.get(half as usize).copied().unwrap_or(u32::MAX);
             let unfinished = if let Matter::Erasing(sector) = matter { Some(sector) } else { None };
-            JournalState { journal: Self { base, half, next, number }, unfinished }
+            JournalState { journal: Self { base, half, next, number, sound }, unfinished }
         }))
     }
 
-    /// Begins a journal, on sectors that are blank, and says that the region is ours; twice, as one damaged word must
-    /// not cost the library.
+    /// Begins a journal, on sectors that are blank, and says that the region is ours.
     pub(super) async fn create<F: NorFlash>(flash: &mut F, base: u32) -> Result<Self, F::Error> {
-        let mut journal = Self { base, half: 0, next: 0, number: 0 };
-        journal.append(flash, Matter::Formatted).await?;
-        journal.append(flash, Matter::Formatted).await?;
+        let mut journal = Self { base, half: 0, next: 0, number: 0, sound: 0 };
+        journal.strengthen(flash).await?;
         Ok(journal)
+    }
+
+    /// Says as often that the region is ours that some notes may be damaged before the next start. Only where no erase
+    /// is announced: the newest note counts.
+    pub(super) async fn strengthen<F: NorFlash>(&mut self, flash: &mut F) -> Result<(), F::Error> {
+        while self.sound < LEAST_NOTES {
+            self.append(flash, Matter::Formatted).await?;
+        }
+        Ok(())
     }
 
     /// Number of the sector that notes go to.
@@ -109,6 +122,7 @@ impl Journal {
         flash.write(at, &encode(number, matter)).await?;
         self.next += 1;
         self.number = number;
+        self.sound = self.sound.saturating_add(1);
         Ok(())
     }
 }

@@ -103,7 +103,11 @@ impl<F: NorFlash> JournaledFlash<F> {
             Some(JournalState { journal, unfinished }) => {
                 let mut sound = Self { flash, journal, capacity, blocked_at: None, blind: None };
                 let sector = unfinished.filter(|sector| u32::from(*sector) * sector_bytes::<F>() < capacity);
-                let Some(sector) = sector else { return Ok((sound, Found::Sound)) };
+                let Some(sector) = sector else {
+                    // If it cannot be done, whoever stores something is told why.
+                    let _ = sound.journal.strengthen(&mut sound.flash).await;
+                    return Ok((sound, Found::Sound));
+                };
                 let from = u32::from(sector) * sector_bytes::<F>();
                 if erase_sector(&mut sound.flash, from).await.is_err() {
                     sound.blind = Some(from);

@@ -1,5 +1,7 @@
 //! The control half on a double of the arm's bus: start-up, rounds, slow polls, and every way out of torque.
 
+mod anew;
+mod answers;
 mod arbitrary;
 mod bus_time;
 mod cycles;

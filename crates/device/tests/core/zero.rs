@@ -2,7 +2,7 @@
 
 use control::{Command as Control, Fault, State};
 use device::{Command, Controller, DeviceController, EventKind, Refusal, Stage, StartupError};
-use puck::{Counts, Node, PropertyId, SafetyMode};
+use puck::{Action, Counts, Node, PropertyId, Request, SafetyMode};
 
 use crate::double::{Bus, HOME, Puck, floating, silent_device, started};
 
@@ -388,6 +388,59 @@ fn g2_a_zeroing_that_the_bus_has_no_room_for_is_refused_and_never_carried_out_la
     bus.run(&mut core, 5.0);
     assert_eq!(bus.pucks[0].position, before, "zeroed after its host had given it up");
     assert_eq!((core.stage(), core.health().zeroed), (Stage::WaitingForActive, true));
+}
+
+/// The same where the room goes in the middle of it, between any two slots. The change that makes it fail: the looks at
+/// the arm wait for room without end. Its answer came behind that of the next command, and was taken for it.
+#[test]
+fn g2_a_zeroing_that_loses_the_bus_on_its_way_is_answered_in_time() {
+    for slots in (0..75).step_by(3) {
+        let (mut core, mut bus) = started();
+        bus.run(&mut core, 0.2);
+        bus.events.clear();
+        bus.commands.push_back(Command::Zero { home: [0.5, -2.0, 0.0, 2.8, 0.0, 0.0, 0.0] });
+        bus.run_slots(&mut core, slots);
+        bus.refuse = u32::MAX;
+        bus.run(&mut core, 0.19);
+        let is_answer = |event: &&EventKind| matches!(event, EventKind::Accepted | EventKind::Refused(_));
+        assert_eq!(bus.events.iter().filter(is_answer).count(), 1, "after {slots} slots: {:?}", bus.events);
+        bus.commands.push_back(Control::Stop.into());
+        bus.run(&mut core, 0.1);
+        assert_eq!(bus.events.iter().filter(is_answer).count(), 2, "a stop behind it, after {slots} slots");
+    }
+}
+
+/// G2: the cable of the bus is out in the middle of a zeroing, and in again when a person has activated the arm, which
+/// may stand elsewhere. The change that makes it fail: the words with the counts wait for room without end.
+#[test]
+fn g2_no_count_is_written_long_after_a_person_has_said_where_the_arm_stands() {
+    let mut broken_off = 0;
+    for slots in 0..110 {
+        let (mut core, mut bus) = started();
+        bus.run(&mut core, 0.2);
+        bus.commands.push_back(Command::Zero { home: [0.5, -2.0, 0.0, 2.8, 0.0, 0.0, 0.0] });
+        bus.run_slots(&mut core, slots);
+        let (out_us, seen) = (bus.now_us, bus.log.len());
+        bus.refuse = u32::MAX;
+        bus.run(&mut core, 1.0);
+        bus.press_activate();
+        bus.refuse = 0;
+        bus.run(&mut core, 0.5);
+        let late = bus.log[seen..].iter().filter(|(time, _)| *time > out_us + 200_000);
+        let written = late.filter(|(_, frame)| {
+            let action = Request::decode(frame).map(|request| request.action);
+            matches!(action, Ok(Action::Set { property: PropertyId::POSITION, .. }))
+        });
+        assert_eq!(written.count(), 0, "after {slots} slots");
+        if bus.events.contains(&EventKind::Blocked(StartupError::ZeroUnfinished)) {
+            broken_off += 1;
+            assert!(!core.health().zeroed);
+            bus.press_idle();
+            bus.run_until(&mut core, Stage::WaitingForZero);
+            assert_zeroing_leads_on(&mut core, &mut bus);
+        }
+    }
+    assert!(broken_off > 5, "{broken_off}");
 }
 
 /// G2: what a person says of an arm that sinks is no longer so once it is written. `counts` of motor 4 in each slot.

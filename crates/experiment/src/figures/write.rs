@@ -135,9 +135,9 @@ pub fn write_lift(rows: &[Carried], trials: usize, folder: &Path) -> Result<(), 
             .map_or_else(String::new, |row| format!("{:.1} kg, {:.1} kg expected", row.carried_kg, row.remembered_kg));
         (label, modes.iter().map(|mode| of(*mode).and_then(|row| row.sag_median_m).map(|sag| sag * 1e3)).collect())
     });
-    let title = format!("hand below its plan when it has lifted, mm, median of {trials} trials");
+    let title = format!("distance of the lifted hand from its plan, mm, median of {trials} trials");
     let panel = bars::Panel { title, groups: groups.collect(), limit: None };
-    let title = "Weight: what is expected does not sag";
+    let title = "Weight: what is expected is carried on the plan";
     bars::draw(&[panel], &bars::members(&modes), title, "weight carried, weight expected").write(folder, "sag")?;
     Ok(())
 }

@@ -208,6 +208,30 @@ fn a_silent_puck_is_a_latched_fault() {
     rig.wait(3.0, |rig| rig.health().state == State::Hold);
 }
 
+/// A10: pucks keep the torque that they were sent last, and the two frames that end it were lost with all others. One
+/// puck stays away, so the start-up never gets to the end. The change that makes it fail: a start-up that has rested
+/// begins with its questions.
+#[test]
+fn a10_a_hand_that_is_not_whole_is_told_to_stop_again_and_again() {
+    let mut rig = gripping(adapt());
+    rig.run(1.0);
+    rig.lose = Box::new(|frame, _| frame.can_id().raw() >> 5 & 0x1F == u16::from(Node::SPREAD.number()));
+    rig.run(0.5);
+    assert_eq!(rig.health().hand, HandStage::Failed);
+    let [zero, idle] = puck::hand_stop_frames();
+    for second in 0..6 {
+        rig.sent.clear();
+        rig.run(1.2);
+        assert!(rig.sent.windows(2).any(|pair| pair == [zero, idle]), "within 1.2 s, {second}: {:?}", rig.sent);
+    }
+    // Where nobody is heard, more often.
+    rig.lose = Box::new(|_, _| true);
+    rig.run(2.0);
+    rig.sent.clear();
+    rig.run(0.4);
+    assert!(rig.sent.windows(2).any(|pair| pair == [zero, idle]));
+}
+
 #[test]
 fn a_hand_that_fails_under_torque_is_a_fault_and_can_be_had_again() {
     let mut rig = gripping(adapt());

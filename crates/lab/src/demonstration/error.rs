@@ -128,6 +128,14 @@ pub enum RecordingError {
         /// The text found there.
         text: String,
     },
+    /// A word that names no state of the supervisor: what was played could not be told from what was not.
+    #[error("{place}: `{text}` is no state, expected {}", states())]
+    UnknownState {
+        /// Where.
+        place: Place,
+        /// The word found there.
+        text: String,
+    },
     /// A field is NaN or infinite.
     #[error("{place}: the value {value} is not finite")]
     NotFinite {
@@ -253,6 +261,11 @@ pub enum DemonstrationError {
         /// Time that it takes, with what is kept before and behind it, s.
         duration: f64,
     },
+}
+
+/// The words for the states, for a message.
+fn states() -> String {
+    control::State::ALL.map(|state| format!("`{}`", state.name())).join(", ")
 }
 
 /// An angle on a line of a terminal: what is absurd has no three hundred digits.

@@ -3,6 +3,8 @@
 //! The table in `docs/recording-format.md` is written from [`LAYOUT`] by
 //! `UPDATE_DOCUMENTS=1 cargo test -p lab --test library recording::`.
 
+use std::fmt::{Display, LowerExp};
+
 use control::State;
 use link::Telemetry;
 
@@ -65,8 +67,16 @@ pub struct RecordingRow {
 impl RecordingRow {
     /// State of the supervisor, a word.
     pub fn state(&self) -> &'static str {
-        State::from_code(self.telemetry.state).map_or("unknown", State::name)
+        State::from_code(self.telemetry.state).map_or(UNKNOWN_STATE, State::name)
     }
+}
+
+/// The word for a state that this version does not know; a device of another version may have one.
+const UNKNOWN_STATE: &str = "unknown";
+
+/// True for a word that [`RecordingRow::state`] writes.
+pub(super) fn is_state(word: &str) -> bool {
+    word == UNKNOWN_STATE || State::ALL.iter().any(|state| state.name() == word)
 }
 
 /// Columns of one quantity.
@@ -91,8 +101,18 @@ const fn quantity(
     Quantity { columns, unit, meaning, fields }
 }
 
-fn list<T: ToString>(values: &[T]) -> String {
-    values.iter().map(T::to_string).collect::<Vec<_>>().join(",")
+fn list<T: Display + LowerExp>(values: &[T]) -> String {
+    values.iter().map(number).collect::<Vec<_>>().join(",")
+}
+
+/// Most characters of a number that is written without an exponent. An estimate that fades away passes through numbers
+/// with forty zeros.
+const PLAIN_DIGITS: usize = 24;
+
+/// A number as short as it can be read back exactly.
+fn number<T: Display + LowerExp>(value: &T) -> String {
+    let plain = value.to_string();
+    if plain.len() > PLAIN_DIGITS { format!("{value:e}") } else { plain }
 }
 
 /// Every quantity of our own layout in the order of its columns: what is written, in the file and in the document.
@@ -116,7 +136,7 @@ pub const LAYOUT: &[Quantity] = &[
         row.telemetry.flags.to_string()
     }),
     quantity(&[PHASE], "1", "phase s of the movement: 1 at its start, towards 0 at its end, 0 outside a run", |row| {
-        row.telemetry.phase.to_string()
+        number(&row.telemetry.phase)
     }),
     quantity(&JOINT_POSITIONS, "rad", "measured joint angles", |row| list(&row.telemetry.q)),
     quantity(&JOINT_VELOCITIES, "rad/s", "estimated joint velocities", |row| list(&row.telemetry.dq)),
@@ -169,7 +189,7 @@ pub const LAYOUT: &[Quantity] = &[
         &[SURPRISE],
         "1",
         "how much this run differs from the successful ones before it; 0 when nothing is compared",
-        |row| row.telemetry.surprise.to_string(),
+        |row| number(&row.telemetry.surprise),
     ),
 ];
 
@@ -241,5 +261,15 @@ mod tests {
         names.sort();
         names.dedup();
         assert_eq!(names.len(), count);
+    }
+
+    /// The change that makes it fail: every number is written without an exponent. 48 characters then.
+    #[test]
+    fn a_number_is_short_however_small_it_is_and_is_read_back_exactly() {
+        for value in [1e-45_f32, -1e-45, f32::MIN_POSITIVE, f32::MAX, f32::MIN, 0.1, -0.000_308_511_55, 0.0] {
+            let text = number(&value);
+            assert!(text.len() <= PLAIN_DIGITS && text.parse() == Ok(value), "{value:e}: {text}");
+        }
+        assert_eq!(list(&[1.0_f32, 1e-45, -0.25]), "1,1e-45,-0.25");
     }
 }

@@ -49,10 +49,23 @@ pub(super) fn approach(client: &mut Client<Device>, q: [f32; 7], seconds: f32) -
 /// # Errors
 /// [`ProcedureError`]: the device refuses, the arm stops by itself, or it takes too long.
 pub fn travel(client: &mut Client<Device>, q: [f32; 7], progress: impl FnMut(f64)) -> Result<(), ProcedureError> {
+    within(client, q, 0.0, progress)
+}
+
+/// The same within `seconds`, or longer where the device asks for it.
+///
+/// # Errors
+/// As [`travel`].
+pub(super) fn within(
+    client: &mut Client<Device>,
+    q: [f32; 7],
+    seconds: f32,
+    progress: impl FnMut(f64),
+) -> Result<(), ProcedureError> {
     client.require(Capability::Arm)?;
     hold(client)?;
     client.take_events();
-    approach(client, q, 0.0)?;
+    approach(client, q, seconds)?;
     wait_for("the move to the posture", LONGEST_TRAVEL, client, progress)
 }
 

@@ -89,7 +89,9 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut out = Printer::new(global.output(), !command.summary);
     let mut reader = Reader::default();
     let mut totals: Vec<InterfaceTotals> = Vec::new();
-    let garbage = source.read(&interrupt, DOING, |_, line| {
+    let garbage = source.read(&interrupt, DOING, |heard| {
+        // Whoever looks on wants to see what there is, and not what fills a buffer.
+        let Some((_, line)) = heard else { return out.flush() };
         if command.interface.as_deref().is_some_and(|only| *only != *line.interface) {
             return Ok(true);
         }
@@ -176,10 +178,17 @@ impl Printer {
                 self.write("no frames")?;
             }
         }
+        self.flush().map(|_| ())
+    }
+
+    /// Shows what was written; whether there is still a reader.
+    fn flush(&mut self) -> Result<bool, Failure> {
         match self.out.flush() {
-            Err(cause) if cause.kind() != ErrorKind::BrokenPipe => Err(broken(cause.into())),
-            _ => Ok(()),
+            Err(cause) if cause.kind() != ErrorKind::BrokenPipe => return Err(broken(cause.into())),
+            Err(_) => self.closed = true,
+            Ok(()) => {}
         }
+        Ok(!self.closed)
     }
 
     fn write(&mut self, text: &str) -> Result<bool, Failure> {

@@ -30,9 +30,9 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let source = Source::open(Some(&command.log), None, false, DOING)?;
     let interrupt = connection::interrupt();
     let mut replay = Replay::default();
-    let garbage = source.read(&interrupt, DOING, |number, line| match replay.take(number, line) {
-        Ok(()) => Ok(true),
-        Err(error) => Err(refused(error)),
+    let garbage = source.read(&interrupt, DOING, |heard| {
+        let taken = heard.map_or(Ok(()), |(number, line)| replay.take(number, line));
+        taken.map(|()| true).map_err(refused)
     })?;
     if interrupt.is_raised() {
         return Err(Failure::new(

@@ -1,7 +1,7 @@
 //! Where lines come from: a file, standard input, or an interface.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Stdin};
+use std::io::{BufRead, BufReader, Read, Seek, Stdin};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
@@ -86,12 +86,26 @@ impl Source {
         }
     }
 
-    /// Hands line after line, with its number, to `take` until the source ends, `take` says no, or the user interrupts.
+    /// True if the file has less than was read of it: whoever writes it has begun it anew, and it is read from its
+    /// beginning. A simulated device does so with `--force`.
+    fn starts_anew(&mut self) -> bool {
+        let Self::File { reader, path, .. } = self else { return false };
+        let Ok(passed) = reader.stream_position() else { return false };
+        let is_shorter = reader.get_ref().metadata().is_ok_and(|file| file.len() < passed);
+        if !is_shorter || reader.rewind().is_err() {
+            return false;
+        }
+        eprintln!("{} was begun anew", path.display());
+        true
+    }
+
+    /// Hands line after line, with its number, to `take` until the source ends, `take` says no, or the user interrupts;
+    /// nothing where the next line may be long in coming.
     pub(super) fn read(
         mut self,
         interrupt: &Interrupt,
         doing: &str,
-        mut take: impl FnMut(u64, LogLine) -> Result<bool, Failure>,
+        mut take: impl FnMut(Option<(u64, LogLine)>) -> Result<bool, Failure>,
     ) -> Result<Garbage, Failure> {
         let mut garbage = Garbage::default();
         let mut number = 0;
@@ -99,27 +113,30 @@ impl Source {
         while !interrupt.is_raised() {
             let (count, follow) = match &mut self {
                 Self::Interface { port, name } => {
+                    if !take(None)? {
+                        break;
+                    }
                     let heard = port.listen(PAUSE).map_err(|error| HostError::Transport(error).into_failure(doing))?;
                     let Some((time, frame)) = heard else { continue };
                     let time_us = time.duration_since(UNIX_EPOCH).unwrap_or_default().as_micros() as u64;
                     number += 1;
-                    if !take(number, LogLine { time_us, interface: name.as_str().into(), frame })? {
+                    if !take(Some((number, LogLine { time_us, interface: name.as_str().into(), frame })))? {
                         break;
                     }
                     continue;
                 }
                 Self::File { reader, path, follow } => {
                     let room = LONGEST_LINE.saturating_sub(text.len() as u64);
-                    let count = reader.take(room).read_until(b'\n', &mut text).map_err(|cause| {
-                        Failure::of_file(
-                            ErrorCode::LogUnreadable,
-                            format!("{doing}: cannot read {}", path.display()),
-                            cause,
-                        )
-                    })?;
-                    (count, *follow)
+                    let unreadable = |cause| {
+                        let doing = format!("{doing}: cannot read {}", path.display());
+                        Failure::of_file(ErrorCode::LogUnreadable, doing, cause)
+                    };
+                    (reader.take(room).read_until(b'\n', &mut text).map_err(unreadable)?, *follow)
                 }
                 Self::Input(reader) => {
+                    if reader.buffer().is_empty() && !take(None)? {
+                        break;
+                    }
                     let count = reader.take(LONGEST_LINE).read_until(b'\n', &mut text).map_err(|cause| {
                         Failure::new(ErrorCode::LogUnreadable, format!("{doing}: cannot read standard input"), cause)
                     })?;
@@ -131,7 +148,14 @@ impl Source {
                 let cause = format!("line {} has more than {LONGEST_LINE} bytes", number + 1);
                 return Err(Failure::new(ErrorCode::LogLines, doing, cause));
             }
+            if follow && count == 0 && self.starts_anew() {
+                (number, text) = (0, Vec::new());
+                continue;
+            }
             if follow && !whole {
+                if !take(None)? {
+                    break;
+                }
                 // The rest of the line, or the next one, is still to be written.
                 std::thread::sleep(PAUSE);
                 continue;
@@ -145,7 +169,7 @@ impl Source {
             if !line.trim().is_empty() && !line.starts_with('#') {
                 match line.parse() {
                     Ok(line) => {
-                        if !take(number, line)? {
+                        if !take(Some((number, line)))? {
                             break;
                         }
                     }

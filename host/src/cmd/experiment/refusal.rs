@@ -1,13 +1,15 @@
 //! Results that an experiment cannot go on with, and the options with which it could.
 
 use std::io::ErrorKind;
+use std::path::Path;
 
 use experiment::header::Difference;
 use experiment::log::ResultsError;
-use experiment::{Cell, Grid, Scenario};
+use experiment::{Cell, Grid, Mode, Scenario};
 use sim::world::ObjectKind;
 
 use super::{Cmd, ErrorCode, Failure};
+use crate::quoted;
 
 /// The command, in front of what it failed with.
 pub(super) const DOING: &str = "experiment";
@@ -45,6 +47,30 @@ pub(super) fn of(error: ResultsError, command: &Cmd) -> Failure {
             _ => Failure::of_file(ErrorCode::ResultsNotWritten, DOING, error),
         },
     }
+}
+
+/// The failure of a mode that compares forces with what a primitive expects, which has nothing of the kind.
+pub(super) fn without_expectation(file: &Path, mode: Mode) -> Failure {
+    let cause = format!("{}: the primitive has no expected forces", file.display());
+    Failure::new(ErrorCode::NoExpectation, format!("{REFUSED}: mode {mode}"), cause)
+        .help(format!("`tactus rehearse {}`, or `--modes a` alone", quoted::path(file)))
+}
+
+/// The warning of runs at speeds at which the expectation is believed in part or not at all; `trust` says how far, 1
+/// to 0. They are no error: how much that costs is what such an experiment tells.
+pub(super) fn disbelieved(speeds: &[f64], trust: impl Fn(f64) -> f64) -> Option<String> {
+    let told: Vec<String> = speeds
+        .iter()
+        .filter_map(|speed| match trust(*speed) {
+            trust if trust >= 1.0 => None,
+            trust if trust > 0.0 => Some(format!("at speed {speed} with {:.0} %", trust * 100.0)),
+            _ => Some(format!("at speed {speed} not at all")),
+        })
+        .collect();
+    let told = Some(told.join(", ")).filter(|told| !told.is_empty())?;
+    Some(format!(
+        "the expected forces were recorded at another speed and are believed {told}: the adaptation is derated"
+    ))
 }
 
 /// The change of the command line after which it is one for the results that are there; another folder where there is
@@ -183,6 +209,23 @@ mod tests {
             let other = [("cells", "0:0", all), (name, "a", "b")];
             assert_eq!(told("cup --resume", &other), ELSEWHERE, "{name}");
         }
+    }
+
+    /// The change that makes it fail: the name goes into the command as it is.
+    #[test]
+    fn a_primitive_without_expectation_is_told_with_a_command_that_can_be_typed() {
+        let failure = without_expectation(Path::new("my cup.toml"), Mode::Adaptive);
+        assert_eq!(failure.code.to_string(), "E635");
+        assert_eq!(failure.help.as_deref(), Some("`tactus rehearse 'my cup.toml'`, or `--modes a` alone"));
+    }
+
+    /// The changes that make it fail: a trust of 0 or of less than 1 is none to be told of.
+    #[test]
+    fn speeds_at_which_the_expectation_is_not_believed_are_told() {
+        let trust = |speed: f64| (2.0 - speed).clamp(0.0, 1.0);
+        assert_eq!(disbelieved(&[0.9, 1.0], trust), None);
+        let told = disbelieved(&[1.0, 1.75, 2.0], trust).unwrap_or_default();
+        assert!(told.contains("believed at speed 1.75 with 25 %, at speed 2 not at all:"), "{told}");
     }
 
     /// The change that makes it fail: one code for all, E124, which is that of a defect.

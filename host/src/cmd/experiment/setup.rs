@@ -66,6 +66,9 @@ pub(super) fn configuration(
         ..usual
     };
     must_expect_forces(&config)?;
+    if !command.figures_only {
+        warn_of_speeds(command, &config, output)?;
+    }
     experiment::check(&config).map_err(|error| failure(error, command))?;
     if let (Some(_), false) = (&command.primitive, command.figures_only) {
         keep(&config.primitive, &file(command, out), out)?;
@@ -110,10 +113,33 @@ fn must_expect_forces(config: &Config) -> Result<(), Failure> {
     else {
         return Ok(());
     };
-    let file = config.primitive.file.display();
-    let cause = format!("{file}: the primitive has no expected forces");
-    Err(Failure::new(ErrorCode::NoExpectation, format!("{REFUSED}: mode {mode}"), cause)
-        .help(format!("`tactus rehearse {file}`, or `--modes a` alone")))
+    Err(refusal::without_expectation(&config.primitive.file, *mode))
+}
+
+/// Warns of the speeds of the run at which a mode that is tried cannot believe the expectation.
+fn warn_of_speeds(command: &Cmd, config: &Config, output: Output) -> Result<(), Failure> {
+    let (Some(expectation), true) =
+        (&config.primitive.expectation, config.modes.iter().any(|mode| mode.needs_expectation()))
+    else {
+        return Ok(());
+    };
+    let usual = config.variation.speed;
+    let mut speeds: Vec<f64> = match &command.sweep {
+        Some(sweep) => sweep.values.iter().map(|value| sweep.variation(config.variation, *value).speed).collect(),
+        None => vec![usual],
+    };
+    // A sweep of another factor has one speed.
+    speeds.dedup();
+    let primitive = config
+        .primitive
+        .to_primitive()
+        .map_err(|cause| crate::cmd::check::failure(cause, &config.primitive.file, DOING))?;
+    let (recorded, taught) = (expectation.recorded_duration, config.primitive.movement.duration);
+    let trust = |speed: f64| primitive.expected().map_or(1.0, |expected| expected.trust(recorded * speed / taught));
+    if let Some(words) = refusal::disbelieved(&speeds, trust) {
+        output.warn(words);
+    }
+    Ok(())
 }
 
 /// File of the primitive that is tried in a folder.

@@ -90,6 +90,7 @@ pub(super) fn run(command: &Payload, client: &mut Client<Device>, global: &Globa
             None => client.forget_weight(),
         }
         .map_err(failed)?;
+        global.tell_forgotten();
     }
     show(client, global)
 }

@@ -317,6 +317,10 @@ impl<S: Store> Application for ArmApplication<S> {
         let command = match request {
             Request::Zero { home } => {
                 finite(&home)?;
+                if !calm {
+                    // A zeroing takes up to 170 ms, and a second one behind it would be given up before its turn.
+                    return Err((Refusal::CommandQueueFull, [0, 0]));
+                }
                 return Ok(Action::Command(Command::Zero { home }));
             }
             Request::InitialiseHand => return Ok(Action::Command(Command::InitialiseHand)),

@@ -131,8 +131,10 @@ impl<A: Application> HostSession<A> {
         // The time-out is served before each request: no host inherits the motion of another.
         while self.watch_host(now_ms, port) {
             let present = self.owner.as_ref().map(Owner::session);
-            // A stop waits neither for the store nor for room: what is not answered its host repeats.
-            let stops_only = !open || port.room() < 2 * ANSWER_ROOM;
+            // An order of a host that has left is not decided yet: nobody comes before its motion is known and stopped.
+            let undecided = present.is_none() && self.pending.holds_orders();
+            // A stop waits neither for that, nor for the store, nor for room: what is not answered its host repeats.
+            let stops_only = !open || undecided || port.room() < 2 * ANSWER_ROOM;
             let is_owner = |session| present == Some(session);
             let Some(frame) = self.inbox.pop(now_ms, present.is_none(), stops_only, is_owner) else { break };
             self.handle(now_ms, frame, port);

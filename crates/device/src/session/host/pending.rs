@@ -4,9 +4,13 @@
 
 use heapless::Deque;
 
-/// Commands that may be on their way to the control half at a time, the last place of them kept for a stop. A queue
-/// that holds fewer would have no place for that.
+/// Commands that may be on their way to the control half at a time, all but `ORDERS` of them stops. A queue that
+/// holds fewer would have no place for those.
 pub const PENDING_COMMANDS: usize = 8;
+
+/// Most of them that are no stops. The control half takes one in a cycle, and a stop behind them is to be obeyed within
+/// 20 ms: four cycles, and the one that is under way.
+const ORDERS: usize = 3;
 
 /// A command that the control half does not answer within this time is given up, ms. It answers within two
 /// cycles, 7 ms, and to zeroing after its last question to the safety module, 150 ms; longer means that it is not
@@ -42,7 +46,7 @@ pub(super) struct Pending(Deque<(Requester, u32), PENDING_COMMANDS>);
 impl Pending {
     /// True if another command can be tracked.
     pub(super) fn has_room(&self, stop: bool) -> bool {
-        self.0.len() + usize::from(!stop) < PENDING_COMMANDS
+        self.0.len() < if stop { PENDING_COMMANDS } else { ORDERS }
     }
 
     /// True if the control half owes no answer.
@@ -53,6 +57,11 @@ impl Pending {
     /// True if a host without a session waits for a stop.
     pub(super) fn holds_stop_of_others(&self) -> bool {
         self.0.iter().any(|(requester, _)| matches!(requester, Requester::OtherHost { .. }))
+    }
+
+    /// True if a host that had the session, now or before, waits for an answer.
+    pub(super) fn holds_orders(&self) -> bool {
+        self.0.iter().any(|(requester, _)| matches!(requester, Requester::Owner { .. }))
     }
 
     /// A command has been queued.

@@ -1,0 +1,105 @@
+//! The bus is started anew after a loss: whatever torque the pucks still have ends, and no zero that is doubted is
+//! believed.
+
+use device::{Command, Controller, EventKind, Stage, StartupError};
+use puck::{MotorMode, Node, PuckTorque, SafetyMode};
+
+use crate::double::{Bus, HOME, floating, silent_device};
+
+/// True if a motor of the arm applies torque.
+fn pulls(bus: &Bus) -> bool {
+    bus.pucks.iter().any(|puck| puck.mode == MotorMode::Torque && puck.torque != PuckTorque::ZERO)
+}
+
+/// Time for which a motor applies torque once its bus is whole again, ms.
+fn torque_after_outage(milliseconds: u64) -> u64 {
+    let (mut core, mut bus) = floating();
+    bus.deaf = true;
+    bus.run(&mut core, milliseconds as f64 / 1000.0);
+    assert!(pulls(&bus), "nobody told the pucks anything");
+    bus.deaf = false;
+    let back = bus.now_us;
+    while pulls(&bus) && bus.now_us < back + 5_000_000 {
+        bus.run_slots(&mut core, 1);
+    }
+    (bus.now_us - back) / 1000
+}
+
+/// A10: pucks keep the torque that they were sent last. A start-up that has not found the safety module rests for a
+/// second, and the pucks are heard again meanwhile. The change that makes it fail: no stop frames while it rests, or
+/// none once it has rested.
+#[test]
+fn a10_torque_ends_as_soon_as_the_bus_is_whole_again_however_long_it_was_not() {
+    for milliseconds in (150..2500).step_by(50).chain([5000, 20_000]) {
+        let lasts = torque_after_outage(milliseconds);
+        assert!(lasts <= 100, "{lasts} ms after an outage of {milliseconds} ms");
+    }
+}
+
+/// Each command has one answer; that to the next one would be taken for it. The change that makes it fail: a bus
+/// that is started anew forgets the answer of the same slot.
+#[test]
+fn a_refusal_in_the_very_cycle_in_which_the_bus_is_started_anew_is_told() {
+    let answers = |bus: &Bus| {
+        let is_answer = |event: &&EventKind| matches!(event, EventKind::Accepted | EventKind::Refused(_));
+        bus.events.iter().filter(is_answer).count()
+    };
+    let mut restarts = 0;
+    for slots in 0..150 {
+        let (mut core, mut bus) = (silent_device(), Bus::idle());
+        bus.sensor_present = false;
+        bus.run_until(&mut core, Stage::WaitingForZero);
+        bus.commands.push_back(Command::Zero { home: HOME });
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        // The sensor answers late: everything is asked anew.
+        (bus.sensor_present, bus.sensor_awake_at) = (true, Some(0));
+        bus.run_slots(&mut core, slots);
+        let before = answers(&bus);
+        bus.commands.push_back(Command::Zero { home: [9.0; 7] });
+        bus.run_slots(&mut core, 6);
+        assert_eq!(answers(&bus) - before, 1, "after {slots} slots");
+        restarts += core.health().counters.restarts;
+    }
+    assert!((10..140).contains(&restarts), "it comes before and after: {restarts}");
+}
+
+/// The same where a start-up that has failed begins anew. The change that makes it fail: it forgets the answer.
+#[test]
+fn a_refusal_in_the_very_slot_in_which_a_start_up_begins_anew_is_told() {
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
+    bus.pucks[3].present = false;
+    bus.run_until(&mut core, Stage::Blocked);
+    // Longer than its rest, one in each slot.
+    for _ in 0..1000 {
+        bus.commands.push_back(Command::Zero { home: HOME });
+        let before = bus.events.len();
+        bus.run_slots(&mut core, 1);
+        let told = bus.events[before..].iter().filter(|event| matches!(event, EventKind::Refused(_))).count();
+        assert_eq!(told, 1, "{:?}", core.stage());
+    }
+    assert_ne!(core.stage(), Stage::Blocked, "it has begun anew");
+}
+
+/// G2: a safety module that is misheard once, as if the emergency stop were pressed, is no reason to believe counts
+/// that began anew. The words that its zero is none were lost. The change that makes it fail: a loss of power ends the
+/// doubt.
+#[test]
+fn g2_a_doubt_outlives_an_emergency_stop_that_was_none() {
+    for tries_to_zero in [false, true] {
+        let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+        bus.pucks[3].awake_at = None;
+        bus.run_until(&mut core, Stage::Reading);
+        bus.lose_safety_writes = 3;
+        bus.run_until(&mut core, Stage::WaitingForZero);
+        bus.run(&mut core, 0.1);
+        assert_eq!((bus.lose_safety_writes, bus.safety_zero), (0, true));
+        bus.wrong_safety_mode = Some(SafetyMode::EStop);
+        if tries_to_zero {
+            bus.commands.push_back(Command::Zero { home: HOME });
+        }
+        bus.run(&mut core, 4.0);
+        let health = core.health();
+        assert_eq!((core.stage(), health.zeroed), (Stage::WaitingForZero, false), "{:?}", bus.events);
+        assert_eq!(health.blocked, Some(StartupError::CountsAnew(Node::ARM[3])));
+    }
+}
