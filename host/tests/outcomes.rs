@@ -50,6 +50,16 @@ fn cli_5_a_goal_out_of_reach_is_refused_by_check_and_by_a_dry_run() {
     assert_eq!(report["result"]["goal_m"], serde_json::json!([5.0, 5.0, 5.0]));
 }
 
+/// The change that makes it fail: `run` sends what it is asked for, and the device takes compliant gains unsaid.
+#[test]
+fn a_plan_that_bends_is_not_run_with_stiff_gains() {
+    let folder = learned(3.0, "");
+    let refused = tactus(folder.path(), &format!("{DEVICE} run reach.toml --stiff --mode adapt")).failure().code(2);
+    let text = stderr(&refused);
+    assert!(text.contains("error[E200]") && text.contains("leave out `--stiff`"), "{text}");
+    tactus(folder.path(), &format!("{DEVICE} run reach.toml --stiff --mode open")).success();
+}
+
 #[test]
 fn a_figure_that_nobody_measured_is_null_and_not_zero() {
     let folder = learned(3.0, "");

@@ -4,19 +4,10 @@
 
 use core::fmt;
 
-/// The tool pose in the position feedback `K_x (x_d - x)` of Eq (11).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PoseFeedback {
-    /// The measured pose: integral action through `q_d`, removes the steady-state error of friction and model.
-    Measured,
-    /// `FK(q_d)`: no integral action, so that a contact is not wound up; the joint gains alone set the stiffness.
-    Planned,
-}
-
 /// The source of the desired joint acceleration of Eq (10).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AccelerationSource {
-    /// `J^+ (ddx_d + K_x (dx_d - dx) - dJ dq)`, where `dx` is the velocity of the pose named by [`PoseFeedback`].
+    /// `J^+ (ddx_d + K_x (dx_d - dx) - dJ dq)`, where `dx` is the velocity of the pose that is fed back.
     Analytic,
     /// The low-passed numerical derivative of `dq_d`.
     Differentiated,
@@ -47,14 +38,21 @@ pub struct RunOptions {
     pub feedback: bool,
     /// True if the force controller of Eq (12) adds its torque.
     pub force_control: bool,
-    /// Pose used in Eq (11).
-    pub pose_feedback: PoseFeedback,
     /// Acceleration used in Eq (10).
     pub acceleration: AccelerationSource,
     /// True if the finger gauges bend the finger rows; only together with `feedback`.
     pub finger_feedback: bool,
-    /// True if the arm tracks with the compliant gains, so that the force controller is not overruled.
+    /// True if the arm tracks with the compliant gains, and Eq (11) is closed over the planned pose, so that the force
+    /// controller is not overruled; over the measured one otherwise. A plan that bends is followed with compliant gains
+    /// whatever this says: with stiff ones the loop over the force sensor swings where there is no friction.
     pub compliant: bool,
+}
+
+impl RunOptions {
+    /// The same, with compliant gains where the plan bends.
+    pub(crate) fn with_fitting_gains(self) -> Self {
+        RunOptions { compliant: self.compliant || self.feedback, ..self }
+    }
 }
 
 impl Default for RunOptions {
@@ -65,7 +63,6 @@ impl Default for RunOptions {
             speed: 1.0,
             feedback: false,
             force_control: false,
-            pose_feedback: PoseFeedback::Measured,
             acceleration: AccelerationSource::Analytic,
             finger_feedback: true,
             compliant: false,

@@ -17,7 +17,7 @@ pub mod time;
 pub mod units;
 
 pub use act::Actuation;
-pub use command::{AccelerationSource, Command, Goal, PoseFeedback, Refusal, RunOptions};
+pub use command::{AccelerationSource, Command, Goal, Refusal, RunOptions};
 pub use cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
 pub use cycle::{Caution, Cycle, MAX_KERNELS};
 pub use guard::{Fault, State};

@@ -2,7 +2,7 @@
 
 use control::act::hand::TORQUE_LIMIT as HAND_LIMIT;
 use control::act::limit::STEP_LIMIT;
-use control::command::{AccelerationSource, Command, Goal, PoseFeedback, RunOptions};
+use control::command::{AccelerationSource, Command, Goal, RunOptions};
 use control::law::Gains;
 use control::model::ArmModel;
 use control::plan::load;
@@ -189,10 +189,9 @@ fn any_command() -> impl Strategy<Value = Command> {
                 speed: if d { speed } else { 1.0 },
                 feedback: a,
                 force_control: b,
-                pose_feedback: if c { PoseFeedback::Measured } else { PoseFeedback::Planned },
                 finger_feedback: e,
                 compliant: f,
-                acceleration: if a { AccelerationSource::Analytic } else { AccelerationSource::Differentiated },
+                acceleration: if c { AccelerationSource::Analytic } else { AccelerationSource::Differentiated },
             })
         }),
         Just(Command::Stop),

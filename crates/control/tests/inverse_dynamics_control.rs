@@ -22,7 +22,7 @@ fn the_torque_is_inertia_bias_feedback_and_friction() {
         planned: JointVelocities::from_array([-1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0]),
     };
     let frames = Frames::new(&arm, &state.q);
-    let mut controller = JointController::new();
+    let mut controller = JointController::new(0.01);
     let torque = controller.torque(&arm, &gains, &frames, &state, &state.dq.0, &reference).0;
 
     let friction = Vector7::from_fn(|joint, _| {

@@ -190,7 +190,7 @@ pub fn rehearsed(config: &Config, interrupt: &Interrupt) -> Result<PrimitiveFile
     let seeds: Vec<u64> = (1..=REHEARSALS).collect();
     // A weight is only measured where it is lifted: an arm that gives way would leave it on the table.
     let exact = config.scenario == Scenario::Lift;
-    let options = if exact { Mode::Track.options() } else { config.scenario.options(Mode::OpenLoop) };
+    let options = if exact { Mode::Track } else { Mode::OpenLoop }.options();
     let runs = in_parallel(config.jobs, &seeds, |seed| rehearsal(&movement, &arm, scene, *seed, options, interrupt));
     let recordings = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
     remember_rehearsals(&mut primitive, &recordings, movement.movement.duration, Payload::default(), true)?;

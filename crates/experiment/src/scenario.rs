@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use link::RunOptions;
 use serde::{Deserialize, Serialize};
 use sim::teacher::TaughtMovement;
 use sim::world::ObjectKind;
@@ -78,15 +77,6 @@ impl Scenario {
             Scenario::Lift => vec![Mode::Adaptive],
             Scenario::Fingers => vec![Mode::Adaptive, Mode::RigidFingers],
         }
-    }
-
-    /// The options with which the device runs a mode. All modes of a scenario have the same gains.
-    ///
-    /// An object that stands is approached with compliant gains, so that a touch moves the arm before it topples the
-    /// object. A hand above a table needs its height: with compliant gains it sags by its own friction as much as it
-    /// shall give way, so there the gains are stiff.
-    pub fn options(self, mode: Mode) -> RunOptions {
-        RunOptions { compliant: self != Scenario::Bottle, ..mode.options() }
     }
 
     /// True if the movement itself lifts the object.

@@ -282,7 +282,7 @@ impl Attempt<'_> {
         prepared: &Prepared,
         key: Key,
     ) -> Result<procedure::RunOutcome, ProcedureError> {
-        let options = link::RunOptions { speed: config.variation.speed as f32, ..config.scenario.options(key.mode) };
+        let options = link::RunOptions { speed: config.variation.speed as f32, ..key.mode.options() };
         let mut request = RunRequest::new(prepared.name.clone(), config.primitive.movement.duration, options);
         request.rest = REST_SECONDS;
         let telemetry = &mut *self.telemetry;

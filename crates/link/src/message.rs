@@ -95,16 +95,6 @@ pub struct Goal {
     pub orientation: Option<[f32; 4]>,
 }
 
-/// The pose that closes the position loop of Eq (11).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum PoseFeedback {
-    /// The measured pose: no steady-state error.
-    #[default]
-    Measured,
-    /// The pose of the desired joint angles: a contact is not wound up.
-    Planned,
-}
-
 /// Where the desired joint acceleration of Eq (10) comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum AccelerationSource {
@@ -126,13 +116,12 @@ pub struct RunOptions {
     pub feedback: bool,
     /// The force controller of Eq (12) adds its torque.
     pub force_control: bool,
-    /// Pose used in Eq (11).
-    pub pose_feedback: PoseFeedback,
     /// Acceleration used in Eq (10).
     pub acceleration: AccelerationSource,
     /// The fingers' strain gauges bend the plan of the fingers too; only with `feedback`.
     pub finger_feedback: bool,
-    /// The arm gives way to what pushes it instead of insisting on the plan.
+    /// The arm gives way to what pushes it instead of insisting on the plan; Eq (11) is closed over the planned pose
+    /// then, over the measured one otherwise. With `feedback` it gives way in any case.
     pub compliant: bool,
 }
 
@@ -143,7 +132,6 @@ impl Default for RunOptions {
             speed: 1.0,
             feedback: false,
             force_control: false,
-            pose_feedback: PoseFeedback::Measured,
             acceleration: AccelerationSource::Analytic,
             finger_feedback: true,
             compliant: false,

@@ -9,7 +9,7 @@ use control::{Fault, State};
 use device::Stage;
 use flash::{Flash, FlashChip, FlashTimes};
 use host::Host;
-use link::message::{PoseFeedback, RunOptions};
+use link::message::RunOptions;
 use link::{EventKind, HandStage, Name, Reply, Request};
 
 /// Starts the arm up, from the released E-stop to the initialised hand.
@@ -55,7 +55,6 @@ fn the_application_starts_up_takes_an_upload_runs_it_and_stops() {
             speed: 1.0,
             feedback: false,
             force_control: false,
-            pose_feedback: PoseFeedback::Measured,
             acceleration: Default::default(),
             finger_feedback: false,
             compliant: false,

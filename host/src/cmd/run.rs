@@ -53,7 +53,7 @@ pub struct Cmd {
     /// Use of the measured force in the run
     #[arg(long, value_enum, default_value_t)]
     pub mode: Mode,
-    /// Stiff gains in every mode: for a hand that must keep its place where nothing pushes
+    /// Stiff gains in the modes `open` and `force`: for a hand that must keep its place where nothing pushes
     #[arg(long)]
     pub stiff: bool,
     /// Let the fingers keep to their plan, whatever their gauges measure
@@ -89,6 +89,12 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     {
         let cause = "`--bus-log` and `bus=` of the device name a log each; one of the two would not be written";
         return Err(Failure::new(ErrorCode::CommandLine, "run refused", cause).help("leave out one of the two"));
+    }
+    if command.stiff && command.mode.options().feedback {
+        let cause =
+            format!("--mode {} bends the plan, and an arm with stiff gains cannot follow it", command.mode.name());
+        let help = "leave out `--stiff`, or take `--mode force` or `--mode open`";
+        return Err(Failure::new(ErrorCode::CommandLine, "run refused", cause).help(help));
     }
     let stored = stored_name(&command.primitive);
     let mut opened = stored.is_some().then(|| open(command, global)).transpose()?;

@@ -116,6 +116,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 Ok(())
             }
             Command::Run(options) => {
+                let options = options.with_fitting_gains();
                 self.may_begin(measured)?;
                 self.supervisor.allows(Trigger::Run)?;
                 self.may_move(measured)?;

@@ -5,6 +5,7 @@ use puck::Transmission;
 
 use crate::guard::disagreement::{Effort, Plan};
 use crate::law::breakaway::Breakaway;
+use crate::law::gains::POSTURE_FRICTION_SPEED;
 use crate::law::integral::PostureIntegral;
 use crate::law::joint::JointController;
 use crate::law::operational::OperationalController;
@@ -83,7 +84,7 @@ impl<R: Real> Posture<R> {
             gives_way: false,
             approach: None,
             integral: PostureIntegral::new(),
-            controller: JointController::new(),
+            controller: JointController::new(R::constant(POSTURE_FRICTION_SPEED)),
             breakaway: Breakaway::none(),
             extra: Vector7::zeros(),
         }

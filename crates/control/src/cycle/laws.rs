@@ -6,6 +6,7 @@ use crate::cycle::record::{Event, flags};
 use crate::cycle::{Cycle, Measured, WRENCH_AGE};
 use crate::guard::monitor::{TIP_REACH, TIP_SPEED_LIMIT, TRACKING_LIMIT};
 use crate::law::gains::Tracking;
+use crate::law::operational::PoseFeedback;
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
 use crate::plan::hand::Grasp;
@@ -273,7 +274,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let task = TaskReference::from_plan(&plan);
         let grips = options.compliant && grasp == Grasp::Gripping;
         operational.keep(lift.step(&task, grips, deviation.as_ref()));
-        let how = (options.pose_feedback, options.acceleration);
+        let how = (PoseFeedback::of_run(options.compliant), options.acceleration);
         let reference = operational.step(&self.model, tracking, measured.frames, measured.state, &task, how);
         if run.goal_moves() {
             // A goal that the joints cannot follow is not led away from the tool.

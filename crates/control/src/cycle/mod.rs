@@ -61,8 +61,8 @@ const WRENCH_AGE: u8 = few_periods(1.0 / 60.0);
 /// Length of the ramp that takes all but gravity and damping away in a soft stop: 100 ms, in control periods.
 const STOP_RAMP: u16 = periods(0.1);
 
-/// Length of the ramp that takes away what a compliant run inherits from a stiff hold: 1 s, in control periods.
-const HANDOVER: u16 = periods(1.0);
+/// Length of the ramp that takes away what a compliant run inherits from a stiff hold: 2 s, in control periods.
+const HANDOVER: u16 = periods(2.0);
 
 /// Time in which the torque of gravity builds up after arming: 100 ms, in control periods.
 const BUILDING_UP: u16 = periods(0.1);

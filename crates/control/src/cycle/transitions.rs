@@ -121,7 +121,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         };
         self.law = Law::Run(Running {
             operational: OperationalController::new(start),
-            controller: JointController::new(),
+            controller: JointController::new(self.gains.tracking(options.compliant).friction_speed),
             handover,
             leaning,
             lag: Lag::none(),

@@ -30,13 +30,14 @@ const STIFF: Numbers = Numbers {
     stiffness: [250.0, 300.0, 105.0, 130.0, 10.0, 16.0, 2.5],
     damping: [18.0, 22.0, 4.5, 5.0, 0.3, 0.5, 0.07],
     clamp: [0.10, 0.10, 0.10, 0.10, 0.20, 0.15, 0.20],
-    pose: 3.0,
+    pose: 2.0,
     posture: 1.0,
     force: (1.0, 2.0),
     moment_share: 1.0,
     force_window: periods(0.2) as usize,
     force_limit: (10.0, 1.0),
-    friction_speed: 0.01,
+    // Friction that is not fed forward while a plan is slow is what a run is beside it at its beginning.
+    friction_speed: 0.004,
 };
 
 /// Soft in contact.
@@ -57,6 +58,10 @@ const COMPLIANT: Numbers = Numbers {
 
 /// Fraction of the model's Coulomb friction that is fed forward. Below 1, so that too large an estimate never drives.
 const FRICTION_FRACTION: f64 = 0.8;
+
+/// Planned speed of an approach at which half of the Coulomb friction is fed forward (rad/s). Without friction its
+/// integral works against what is fed forward: at 0.006 rad/s J7 swings at 4 Hz.
+pub(crate) const POSTURE_FRICTION_SPEED: f64 = 0.01;
 
 /// Largest torque of the integral of `Hold` and `Approach`, in parts of the model's Coulomb friction: enough for
 /// friction that is 30 % more, with 20 % to spare.
@@ -103,8 +108,7 @@ pub struct Tracking<R: Real> {
     pub damping: Vector7<R>,
     /// Coulomb friction fed forward (N m).
     pub coulomb: Vector7<R>,
-    /// Planned speed at which half of the Coulomb friction is fed forward (rad/s): smooths the sign, so that a plan at
-    /// rest does not chatter.
+    /// Planned speed of a run at which half of the Coulomb friction is fed forward (rad/s).
     pub friction_speed: R,
     /// Viscous friction fed forward (N m s/rad).
     pub viscous: Vector7<R>,

@@ -24,16 +24,19 @@ pub struct JointController<R: Real> {
     measured: Vector7<R>,
     /// Friction fed forward in the same cycle (N m).
     friction: Vector7<R>,
+    friction_speed: R,
 }
 
 impl<R: Real> JointController<R> {
-    /// A controller without history.
-    pub fn new() -> Self {
+    /// A controller without history. `friction_speed` is the planned speed at which half of the Coulomb friction is fed
+    /// forward (rad/s): it smooths the sign, so that a plan at rest does not chatter.
+    pub fn new(friction_speed: R) -> Self {
         JointController {
             feedback: Vector7::zeros(),
             desired: Vector7::zeros(),
             measured: Vector7::zeros(),
             friction: Vector7::zeros(),
+            friction_speed,
         }
     }
 
@@ -59,7 +62,7 @@ impl<R: Real> JointController<R> {
 
     /// Forgets the feedback of the last cycle.
     pub fn reset(&mut self) {
-        *self = JointController::new();
+        *self = JointController::new(self.friction_speed);
     }
 
     /// The torque of one tick. `velocity` is fed back (rad/s), measured or observed. A joint that `state` extrapolates,
@@ -74,7 +77,7 @@ impl<R: Real> JointController<R> {
         velocity: &Vector7<R>,
         reference: &JointReference<R>,
     ) -> JointTorques<R> {
-        let friction = friction(gains, &reference.planned);
+        let friction = friction(gains, self.friction_speed, &reference.planned);
         let spring = gains.stiffness.component_mul(&(reference.q.0 - state.q.0));
         let before = self.feedback;
         self.desired = reference.dq.0;
@@ -101,18 +104,12 @@ impl<R: Real> JointController<R> {
     }
 }
 
-impl<R: Real> Default for JointController<R> {
-    fn default() -> Self {
-        JointController::new()
-    }
-}
-
-/// Friction expected at the desired velocity (N m).
-fn friction<R: Real>(gains: &Tracking<R>, dq_d: &JointVelocities<R>) -> Vector7<R> {
-    let mut torque = gains.viscous.component_mul(&dq_d.0);
-    for ((torque, coulomb), rate) in torque.iter_mut().zip(gains.coulomb.iter()).zip(dq_d.0.iter()) {
+/// Friction expected at the planned velocity (N m).
+fn friction<R: Real>(gains: &Tracking<R>, half_at: R, planned: &JointVelocities<R>) -> Vector7<R> {
+    let mut torque = gains.viscous.component_mul(&planned.0);
+    for ((torque, coulomb), rate) in torque.iter_mut().zip(gains.coulomb.iter()).zip(planned.0.iter()) {
         let magnitude = if *rate < R::constant(0.0) { -*rate } else { *rate };
-        *torque += *coulomb * *rate / (magnitude + gains.friction_speed);
+        *torque += *coulomb * *rate / (magnitude + half_at);
     }
     torque
 }

@@ -5,11 +5,13 @@
 //! was pushed away would be thrown back. `x` and `q` are measured, or both those of `q_d`.
 //! `ddq_d` is
 //! `J^+ (ddx_d + K_x (dx_d - dx) - dJ dq) + (I - J^+ J) K_post (dq_post - dq)`, or the low-passed derivative of `dq_d`.
+//! Where the measured pose is fed back it is the plan's own, `J^+ (ddx_d - dJ dq)`: measured speeds would add a damping
+//! of their own to that of Eq (10), with the swing of the cables in it.
 //! The orientation error is `2 vec(q_d (x) conj(q))`, sign-aligned, in world axes, as the Jacobian's angular rows are.
 
 use nalgebra::Vector3;
 
-use crate::command::{AccelerationSource, PoseFeedback};
+use crate::command::AccelerationSource;
 use crate::law::gains::Tracking;
 use crate::law::spring::{self, LET_GO};
 use crate::model::arm::ArmModel;
@@ -28,10 +30,30 @@ const ACCELERATION_CUT_OFF: f64 = 15.0;
 /// not snap back.
 const CORRECTION_SPEED: (f64, f64) = (0.2, 1.0);
 
+/// Time constant with which `q_d` comes to a soft limit (s). Stopped at once, a compliant joint swings past it: J2 that
+/// came with 0.26 rad/s by 0.02 rad, which stops the arm.
+const LIMIT_TIME: f64 = 0.15;
+
 /// Distance of `q_d` from which on a spring is drawn (rad), which nothing but a push or an obstacle does, and below
 /// which it no longer is.
 const DRAWN: f64 = 0.1;
 const RELAXED: f64 = 0.03;
+
+/// The tool pose in the position feedback `K_x (x_d - x)` of Eq (11).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PoseFeedback {
+    /// The measured pose: integral action through `q_d`, removes the steady-state error of friction and model.
+    Measured,
+    /// `FK(q_d)`: no integral action, so that a contact is not wound up; the joint gains alone set the stiffness.
+    Planned,
+}
+
+impl PoseFeedback {
+    /// That of a run.
+    pub fn of_run(compliant: bool) -> Self {
+        if compliant { PoseFeedback::Planned } else { PoseFeedback::Measured }
+    }
+}
 
 /// Eq (11), with `q_d` as its state.
 #[derive(Clone, Debug)]
@@ -101,11 +123,11 @@ impl<R: Real> OperationalController<R> {
         (feedback, acceleration): (PoseFeedback, AccelerationSource),
     ) -> JointReference<R> {
         let planned;
-        let (frames, dq) = match feedback {
-            PoseFeedback::Measured => (frames, &state.dq),
+        let frames = match feedback {
+            PoseFeedback::Measured => frames,
             PoseFeedback::Planned => {
                 planned = Frames::new(model, &self.q_d);
-                (&planned, &self.dq_d)
+                &planned
             }
         };
         let jacobian = frames.jacobian();
@@ -129,20 +151,21 @@ impl<R: Real> OperationalController<R> {
         let preferred = (task.posture - posture) * if self.keeps { R::constant(0.0) } else { gains.posture };
         let dq_d = inverse.resolve(&(task.velocity + correction), &preferred);
 
-        // An error of the measured pose is closed against friction. Where the plan alone moves the joints, feedback
-        // through the sign of the friction would only have a large gain.
-        let planned = match feedback {
-            PoseFeedback::Measured => dq_d,
-            PoseFeedback::Planned => inverse.resolve(&task.velocity, &task.posture_velocity),
-        };
+        // Without what corrects the pose: feedback through the sign of the friction would have a large gain.
+        let planned = inverse.resolve(&task.velocity, &task.posture_velocity);
 
+        let dq = match feedback {
+            PoseFeedback::Measured => &state.dq,
+            PoseFeedback::Planned => &self.dq_d,
+        };
         let rate = task.velocity - jacobian.twist(&dq.0);
         self.lag = sqrt(rate.fixed_rows::<3>(0).norm_squared());
+        let damps = R::constant(if feedback == PoseFeedback::Measured { 0.0 } else { 1.0 });
         let ddq_d = match acceleration {
             AccelerationSource::Analytic => {
-                let damping = gain(rate.fixed_rows::<3>(0).into(), rate.fixed_rows::<3>(3).into());
+                let damping = gain(rate.fixed_rows::<3>(0).into(), rate.fixed_rows::<3>(3).into()) * damps;
                 let wanted = task.acceleration + damping - frames.velocity_product(dq).to_vector();
-                inverse.resolve(&wanted, &((task.posture_velocity - state.dq.0) * gains.posture))
+                inverse.resolve(&wanted, &((task.posture_velocity - state.dq.0) * (gains.posture * damps)))
             }
             AccelerationSource::Differentiated => self.derivative.step(&((dq_d - self.dq_d.0) * R::constant(RATE))),
         };
@@ -150,20 +173,19 @@ impl<R: Real> OperationalController<R> {
         self.dq_d = JointVelocities(dq_d);
         self.clamped = false;
         let mut q_d = self.q_d.0 + dq_d * R::constant(PERIOD);
-        for ((desired, measured), clamp) in q_d.iter_mut().zip(state.q.0.iter()).zip(gains.clamp.iter()) {
-            let kept = at_most(at_least(*desired, *measured - *clamp), *measured + *clamp);
-            self.clamped |= kept != *desired;
-            *desired = kept;
-        }
         // Feedback beyond a soft limit is not wanted of this joint: the arm gives way as far as it can, and does not
         // stop.
-        let limits = model.soft_min.iter().zip(&model.soft_max);
-        for ((desired, rate), (min, max)) in q_d.iter_mut().zip(self.dq_d.0.iter_mut()).zip(limits) {
-            let kept = at_most(at_least(*desired, *min), *max);
-            if kept != *desired {
-                (*desired, *rate) = (kept, R::constant(0.0));
-                self.clamped = true;
+        let near = R::constant(PERIOD / LIMIT_TIME);
+        for joint in 0..JOINTS {
+            let (before, measured, clamp) = (self.q_d.0[joint], state.q.0[joint], gains.clamp[joint]);
+            let (least, most) = (model.soft_min[joint] - before, model.soft_max[joint] - before);
+            let wanted = q_d[joint];
+            let free = at_most(at_least(wanted, before + least * near), before + most * near);
+            if free != wanted {
+                self.dq_d.0[joint] = (free - before) * R::constant(RATE);
             }
+            q_d[joint] = at_most(at_least(free, measured - clamp), measured + clamp);
+            self.clamped |= q_d[joint] != wanted;
         }
         self.q_d = JointPositions(q_d);
         JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d), planned: JointVelocities(planned) }

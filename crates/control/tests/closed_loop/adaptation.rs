@@ -1,7 +1,7 @@
 //! Effect of the feedback of Eq (8) and of the force controller on a run, and its bounds (faults B2 to B7).
 
 use control::act::limit::STEP_LIMIT;
-use control::command::{Command, PoseFeedback, RunOptions};
+use control::command::{Command, RunOptions};
 use control::law::Gains;
 use control::model::Frames;
 use control::time::periods;
@@ -17,11 +17,23 @@ pub(crate) const FEELING: RunOptions = RunOptions {
     speed: 1.0,
     feedback: true,
     force_control: false,
-    pose_feedback: PoseFeedback::Planned,
     acceleration: control::AccelerationSource::Analytic,
     finger_feedback: true,
-    compliant: false,
+    compliant: true,
 };
+
+/// The change that makes it fail: a run takes the gains that it is asked for.
+#[test]
+fn a_plan_that_bends_is_followed_with_compliant_gains_whatever_is_asked() {
+    let torques = |compliant: bool| {
+        let mut rig = holding(START);
+        rig.load(&primitive(&staying(START))).expect("loads");
+        rig.command(Command::Run(RunOptions { compliant, ..FEELING }));
+        rig.plant.push[1] = 1.0;
+        (0..300).map(|_| rig.tick(None).record.tau).collect::<Vec<_>>()
+    };
+    assert_eq!(torques(false), torques(true));
+}
 
 /// The hand points down, the axis of J6 is level; and the same tilted by 20 degrees.
 const DOWN: [f64; 7] = [0.0, 0.6, 0.0, 2.0, 0.0, 0.5, 0.0];
@@ -225,7 +237,7 @@ fn b4_a_silent_sensor_fades_the_feedback_before_the_arm_stops_softly() {
     rig.load(&primitive(&staying(START))).expect("loads");
     rig.command(Command::Run(RunOptions { force_control: true, ..FEELING }));
     rig.run_for(0.3);
-    rig.plant.push[1] = 4.0;
+    rig.plant.push[1] = 0.8;
     rig.run_for(0.7);
     rig.plant.deaf = true;
     let mut last = rig.last.expect("ran").record;

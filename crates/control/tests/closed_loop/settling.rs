@@ -2,7 +2,7 @@
 
 use control::model::{ArmModel, LinkWeight, WeightCorrection};
 use control::units::JointPositions;
-use control::{Command, Fault, Payload, PoseFeedback, RunOptions, State};
+use control::{Command, Fault, Payload, RunOptions, State};
 
 use crate::hand_plant::Hand;
 use crate::primitives::{Design, adapting, primitive};
@@ -54,13 +54,7 @@ fn rig_towards(goal: [f64; 7], friction: f64, model: ArmModel<f64>) -> Rig<f32> 
 /// Distance of the tool from its plan (m) in a run of the heavier arm: the farthest in the first two seconds, and after
 /// six.
 fn beside(rig: &mut Rig<f32>, adapts: bool) -> (f64, f64) {
-    let compliant = RunOptions {
-        compliant: true,
-        feedback: adapts,
-        force_control: adapts,
-        pose_feedback: PoseFeedback::Planned,
-        ..RunOptions::default()
-    };
+    let compliant = RunOptions { compliant: true, feedback: adapts, force_control: adapts, ..RunOptions::default() };
     rig.command(Command::Run(compliant));
     rig.plant.model = heavier();
     let planned = nominal();
@@ -199,7 +193,6 @@ fn let_go_of(
     }
     rig.command(Command::Run(RunOptions {
         compliant: true,
-        pose_feedback: PoseFeedback::Planned,
         force_control: feels,
         feedback: feels,
         ..RunOptions::default()

@@ -1,6 +1,6 @@
 //! Accuracy with which the arm follows: hold, approach, run.
 
-use control::command::{AccelerationSource, Command, Goal, PoseFeedback, RunOptions};
+use control::command::{AccelerationSource, Command, Goal, RunOptions};
 use control::model::ArmModel;
 use control::time::periods;
 use control::units::{JointVelocities, Orientation, Vector7};
@@ -129,7 +129,7 @@ fn the_loop_is_stable_on_a_frictionless_arm_with_two_cycles_of_delay() {
 #[test]
 fn x_of_the_planned_joints_tracks_as_well_but_lets_friction_stand() {
     let mut rig = Rig::<f32>::new(START, 1);
-    let quality = run(&mut rig, RunOptions { pose_feedback: PoseFeedback::Planned, ..RunOptions::default() });
+    let quality = run(&mut rig, RunOptions { ..RunOptions::default() });
     println!("planned: {quality:.5?}");
     assert!(quality.position_rms <= 6e-3, "{quality:?}");
 }
@@ -209,7 +209,7 @@ fn b11_single_and_double_precision_plan_the_same_joints() {
         rig.command(Command::Hold);
         rig.run_for(2.0);
         // With x = FK(q_d) the plan of the joints does not depend on the plant but through the posture.
-        rig.command(Command::Run(RunOptions { pose_feedback: PoseFeedback::Planned, ..RunOptions::default() }));
+        rig.command(Command::Run(RunOptions { compliant: true, ..RunOptions::default() }));
         (0..2400).map(|_| rig.tick(None).record).collect()
     }
     let (single, double) = (plan::<f32>(), plan::<f64>());

@@ -1,6 +1,6 @@
 //! One loop: a law, a pose and a variation, kicked; how much of the kick is left.
 
-use control::command::{Command, PoseFeedback, RunOptions};
+use control::command::{Command, RunOptions};
 use control::law::Gains;
 use control::model::{self, ArmModel, Frames};
 use control::plan::load;
@@ -55,8 +55,6 @@ pub(crate) enum Law {
         compliant: bool,
         feedback: bool,
         force: bool,
-        /// The pose that is fed back is the measured one.
-        measured: bool,
     },
 }
 
@@ -146,7 +144,7 @@ fn settled(gains: &Gains<f64>, law: Law, q: [f64; 7], variation: Variation, push
             arm.command(Command::Approach { q: target, duration: 30.0 });
             arm.run_for(3.0);
         }
-        Law::Run { compliant, feedback, force, measured } => {
+        Law::Run { compliant, feedback, force } => {
             arm.command(Command::Tare);
             while arm.number < 3000 && arm.tick(None).record.dq.iter().any(|v| v.abs() > 0.02) {}
             if arm.cycle.fault() != control::Fault::None {
@@ -161,7 +159,6 @@ fn settled(gains: &Gains<f64>, law: Law, q: [f64; 7], variation: Variation, push
                 feedback,
                 force_control: force,
                 compliant,
-                pose_feedback: if measured { PoseFeedback::Measured } else { PoseFeedback::Planned },
                 finger_feedback: false,
                 ..RunOptions::default()
             }));

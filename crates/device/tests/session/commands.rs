@@ -3,7 +3,7 @@
 use control::{CycleRecord, Fault, State};
 use device::{Command, Counters, EventKind, HandFailure, Refusal as ControlRefusal, Stage, TimedRecord};
 use link::frame::FRAME_BYTES;
-use link::message::{AccelerationSource, PoseFeedback};
+use link::message::AccelerationSource;
 use link::{Event, EventKind as LinkKind, Goal, HandStage, Name, Refusal, Reply, Request, RunOptions, Telemetry};
 use proptest::prelude::*;
 use puck::SafetyMode;
@@ -73,7 +73,6 @@ fn run_loads_the_primitive_once_and_passes_every_option() {
         speed: 0.5,
         feedback: true,
         force_control: true,
-        pose_feedback: PoseFeedback::Planned,
         acceleration: AccelerationSource::Differentiated,
         finger_feedback: false,
         compliant: true,
@@ -86,7 +85,6 @@ fn run_loads_the_primitive_once_and_passes_every_option() {
         speed: 0.5,
         feedback: true,
         force_control: true,
-        pose_feedback: control::PoseFeedback::Planned,
         acceleration: control::AccelerationSource::Differentiated,
         finger_feedback: false,
         compliant: true,

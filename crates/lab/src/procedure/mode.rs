@@ -5,7 +5,6 @@ use std::fmt;
 use std::str::FromStr;
 
 use link::RunOptions;
-use link::message::PoseFeedback;
 use serde::{Deserialize, Serialize};
 
 /// Use of the measured force in a run. In files and tables of experiments a mode is its letter.
@@ -54,16 +53,14 @@ impl Mode {
     /// Those of the paper.
     pub const PAPER: [Mode; 3] = [Mode::OpenLoop, Mode::ForceControl, Mode::Adaptive];
 
-    /// The switches of a run in this mode, at the taught speed and goal. All modes but `track` have the same gains
-    /// and close the position loop over the planned pose, so that only the use of force differs between them.
+    /// The switches of a run in this mode, at the taught speed and goal. All modes but `track` have the same gains,
+    /// so that only the use of force differs between them.
     pub fn options(self) -> RunOptions {
-        let compliant = self != Mode::Track;
         RunOptions {
             feedback: matches!(self, Mode::Adaptive | Mode::RigidFingers),
             force_control: self.needs_expectation(),
             finger_feedback: self != Mode::RigidFingers,
-            pose_feedback: if compliant { PoseFeedback::Planned } else { PoseFeedback::Measured },
-            compliant,
+            compliant: self != Mode::Track,
             ..RunOptions::default()
         }
     }
@@ -146,7 +143,7 @@ mod tests {
         assert_eq!(fingers, [false, false, true, false]);
         // Nothing else may differ between the modes that are compared.
         for option in options {
-            assert_eq!((option.pose_feedback, option.compliant), (options[0].pose_feedback, options[0].compliant));
+            assert_eq!(option.compliant, options[0].compliant);
         }
     }
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 use crate::samples::{EVENT_KINDS, Tables, event_index, replies, reply_index, request_index, requests};
 use link::frame::{self, Envelope, FRAME_BYTES};
 use link::image::{Hemisphere, IMAGE_SCHEMA, PrimitiveImage, image_bytes};
-use link::message::{AccelerationSource, PoseFeedback};
+use link::message::AccelerationSource;
 use link::{HandStage, HomeSource, LINK_VERSION, Refusal, SCHEMA_HASH, SecretState};
 
 fn hex(bytes: &[u8]) -> String {
@@ -61,9 +61,6 @@ fn schema(version: u16) -> String {
     }
     for state in [SecretState::Nothing, SecretState::Kept, SecretState::Unreadable, SecretState::NotOffered] {
         line(format!("secret_state {state:?} {}", encoded(&state)));
-    }
-    for choice in [PoseFeedback::Measured, PoseFeedback::Planned] {
-        line(format!("pose_feedback {choice:?} {}", encoded(&choice)));
     }
     for choice in [AccelerationSource::Analytic, AccelerationSource::Differentiated] {
         line(format!("acceleration {choice:?} {}", encoded(&choice)));

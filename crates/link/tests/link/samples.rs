@@ -4,7 +4,7 @@ use link::frame::FRAME_BYTES;
 use link::image::{
     ExpectationMarks, FeedbackClamps, Hemisphere, ImageContent, OrientationError, Waypoint, WaypointVelocity,
 };
-use link::message::{AccelerationSource, ChunkData, PoseFeedback};
+use link::message::{AccelerationSource, ChunkData};
 use link::{
     Calibration, Capabilities, DeviceHello, Event, EventKind, FaultRecord, Goal, HandStage, HomeSource, HostHello,
     LinkCounters, Listing, LostImage, Name, Refusal, Reply, Request, RunOptions, Secret, SecretReport, SecretState,
@@ -31,7 +31,6 @@ pub(crate) fn requests() -> Vec<Request> {
         speed: 0.5,
         feedback: true,
         force_control: false,
-        pose_feedback: PoseFeedback::Planned,
         acceleration: AccelerationSource::Differentiated,
         finger_feedback: true,
         compliant: false,

@@ -11,7 +11,7 @@ use control::model::ArmModel;
 use control::plan::load;
 use control::{Command as Control, LoadRefusal, Payload, RunOptions, State};
 use link::image::{ImageError, renamed_head};
-use link::message::{AccelerationSource, CHUNK_BYTES, ChunkData, Goal, PoseFeedback};
+use link::message::{AccelerationSource, CHUNK_BYTES, ChunkData, Goal};
 use link::{Capabilities, Listing, Name, PrimitiveImage, Refusal, Reply, Request};
 use pinned_init::{Init, init, zeroed};
 
@@ -404,10 +404,6 @@ fn run_options(options: &link::RunOptions) -> Result<RunOptions, Refused> {
         speed: options.speed,
         feedback: options.feedback,
         force_control: options.force_control,
-        pose_feedback: match options.pose_feedback {
-            PoseFeedback::Measured => control::PoseFeedback::Measured,
-            PoseFeedback::Planned => control::PoseFeedback::Planned,
-        },
         acceleration: match options.acceleration {
             AccelerationSource::Analytic => control::AccelerationSource::Analytic,
             AccelerationSource::Differentiated => control::AccelerationSource::Differentiated,
