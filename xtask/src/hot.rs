@@ -81,6 +81,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "control::law::operational::OperationalController<R>::release",
         "the memory is full; something has drawn a spring: seven joints, a few dozen instructions each",
     ),
+    (
+        "control::law::operational::OperationalController<R>::come_to_limits",
+        "the plan is near a soft limit: seven joints, a dozen instructions each",
+    ),
     ("control::law::joint::JointController<R>::keep", "a reply is missing: a few dozen instructions"),
     ("control::sense::swing", "the memory is full; seven joints, a few dozen instructions each"),
     ("control::sense::observer", "the memory is full; a few loops that the cache keeps from one cycle to the next"),

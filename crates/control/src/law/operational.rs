@@ -34,6 +34,9 @@ const CORRECTION_SPEED: (f64, f64) = (0.2, 1.0);
 /// came with 0.26 rad/s by 0.02 rad, which stops the arm.
 const LIMIT_TIME: f64 = 0.15;
 
+/// Distance of `q_d` from a soft limit within which it comes to it slowly, if it does (rad): a plan of 2 rad/s does.
+const NEAR_LIMIT: f64 = 0.35;
+
 /// Distance of `q_d` from which on a spring is drawn (rad), which nothing but a push or an obstacle does, and below
 /// which it no longer is.
 const DRAWN: f64 = 0.1;
@@ -66,6 +69,9 @@ pub struct OperationalController<R: Real> {
     drawn: u8,
     /// The joint whose turn it is to be looked at.
     turn: u8,
+    /// Joints whose `q_d` is near a soft limit, one bit each, J1 lowest, and the one whose turn it is to be looked at.
+    near: u8,
+    looked_at: u8,
     lag: R,
     /// The planned posture goes nowhere by itself.
     keeps: bool,
@@ -81,6 +87,8 @@ impl<R: Real> OperationalController<R> {
             clamped: false,
             drawn: 0,
             turn: 0,
+            near: 0,
+            looked_at: 0,
             lag: R::constant(0.0),
             keeps: false,
         }
@@ -173,22 +181,45 @@ impl<R: Real> OperationalController<R> {
         self.dq_d = JointVelocities(dq_d);
         self.clamped = false;
         let mut q_d = self.q_d.0 + dq_d * R::constant(PERIOD);
-        // Feedback beyond a soft limit is not wanted of this joint: the arm gives way as far as it can, and does not
-        // stop.
-        let near = R::constant(PERIOD / LIMIT_TIME);
-        for joint in 0..JOINTS {
-            let (before, measured, clamp) = (self.q_d.0[joint], state.q.0[joint], gains.clamp[joint]);
-            let (least, most) = (model.soft_min[joint] - before, model.soft_max[joint] - before);
-            let wanted = q_d[joint];
-            let free = at_most(at_least(wanted, before + least * near), before + most * near);
-            if free != wanted {
-                self.dq_d.0[joint] = (free - before) * R::constant(RATE);
-            }
-            q_d[joint] = at_most(at_least(free, measured - clamp), measured + clamp);
-            self.clamped |= q_d[joint] != wanted;
+        self.look_at_a_limit(model, &q_d);
+        if self.near != 0 {
+            self.come_to_limits(model, &mut q_d);
+        }
+        for ((desired, measured), clamp) in q_d.iter_mut().zip(state.q.0.iter()).zip(gains.clamp.iter()) {
+            let kept = at_most(at_least(*desired, *measured - *clamp), *measured + *clamp);
+            self.clamped |= kept != *desired;
+            *desired = kept;
         }
         self.q_d = JointPositions(q_d);
         JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d), planned: JointVelocities(planned) }
+    }
+
+    /// Notes whether a joint of this posture is near a soft limit: one in a tick, because none comes there faster.
+    fn look_at_a_limit(&mut self, model: &ArmModel<R>, q_d: &Vector7<R>) {
+        let joint = usize::from(self.looked_at) % JOINTS;
+        self.looked_at = joint as u8 + 1;
+        let near = R::constant(NEAR_LIMIT);
+        let (q, bit) = (q_d[joint], 1 << joint);
+        let is_near = q < model.soft_min[joint] + near || q > model.soft_max[joint] - near;
+        self.near = if is_near { self.near | bit } else { self.near & !bit };
+    }
+
+    /// Feedback beyond a soft limit is not wanted of a joint: the arm gives way as far as it can, and does not stop.
+    ///
+    /// Not inlined: it is asked near a limit.
+    #[inline(never)]
+    fn come_to_limits(&mut self, model: &ArmModel<R>, q_d: &mut Vector7<R>) {
+        let share = R::constant(PERIOD / LIMIT_TIME);
+        let limits = model.soft_min.iter().zip(&model.soft_max);
+        let joints = q_d.iter_mut().zip(self.dq_d.0.iter_mut()).zip(self.q_d.0.iter());
+        for (((desired, rate), before), (min, max)) in joints.zip(limits) {
+            let (down, up) = ((*min - *before) * share, (*max - *before) * share);
+            let kept = at_most(at_least(*desired, *before + down), *before + up);
+            if kept != *desired {
+                (*desired, *rate) = (kept, (kept - *before) * R::constant(RATE));
+                self.clamped = true;
+            }
+        }
     }
 
     /// Lets go, from the next tick on, of the springs between joints and `q_d` that something has drawn and whose
