@@ -8,6 +8,9 @@
 //! ```text
 //! friction(v) = coulomb + viscous v        least squares over all passes
 //! ```
+//!
+//! A pass counts with the square of its time: the arm swings a little about its way, and the mean of a swing is the
+//! smaller the longer it is watched. Unweighted, the one fastest pass turns the line.
 
 use control::model::{ArmModel, Frames, WeightCorrection};
 use control::units::{JointAccelerations, JointPositions, JointVelocities, Vector7};
@@ -17,9 +20,9 @@ use crate::weigh::{Crossing, Sample, TOUR};
 /// Postures whose passes tell friction: the first of the tour, so that the ways between them are those of the tour.
 pub const POSTURES: &[[f32; 7]] = TOUR.split_at(6).0;
 
-/// Durations of the passes, s: 0.15 to 0.34 rad/s in the middle, less where the hand would be too fast for the device.
+/// Durations of the passes, s: 0.11 to 0.34 rad/s in the middle, less where the hand would be too fast for the device.
 /// Faster passes tell less: what accelerates the arm then outweighs the friction.
-pub const DURATIONS: [f32; 3] = [3.0, 2.0, 1.3];
+pub const DURATIONS: [f32; 4] = [4.0, 3.0, 2.0, 1.3];
 
 /// Fewest passes from which a line is drawn.
 pub const FEWEST: usize = 4;
@@ -107,10 +110,12 @@ pub fn measure(weight: &WeightCorrection, crossings: &[Crossing]) -> Result<[Joi
         return Err(FrictionError::TooFew { passes: crossings.len() });
     }
     let model = ArmModel::<f64>::corrected(weight.payload(), weight);
+    let mut weights = Vec::with_capacity(crossings.len());
     let passes: Vec<[[f64; 2]; 7]> = crossings
         .iter()
         .map(|crossing| {
             let (up, down) = (mean(&model, &crossing.up), mean(&model, &crossing.down));
+            weights.push((crossing.up.len().min(crossing.down.len()) as f64).powi(2));
             std::array::from_fn(|joint| {
                 let ([up, up_speed], [down, down_speed]) = (up[joint], down[joint]);
                 [0.5 * (up - down), 0.5 * (up_speed + down_speed)]
@@ -119,7 +124,7 @@ pub fn measure(weight: &WeightCorrection, crossings: &[Crossing]) -> Result<[Joi
         .collect();
     let mut joints = [JointFriction::default(); 7];
     for (joint, friction) in joints.iter_mut().enumerate() {
-        let points: Vec<[f64; 2]> = passes.iter().map(|pass| pass[joint]).collect();
+        let points: Vec<_> = passes.iter().map(|pass| pass[joint]).zip(weights.iter().copied()).collect();
         *friction = line(&points).ok_or(FrictionError::OneSpeed { joint })?;
         if !friction.left.is_finite() {
             return Err(FrictionError::NotANumber);
@@ -128,19 +133,21 @@ pub fn measure(weight: &WeightCorrection, crossings: &[Crossing]) -> Result<[Joi
     Ok(joints)
 }
 
-/// The line through points (friction, speed); `None` where they are of one speed.
-fn line(points: &[[f64; 2]]) -> Option<JointFriction> {
+/// The line through points (friction, speed) of these weights; `None` where they are of one speed.
+fn line(points: &[([f64; 2], f64)]) -> Option<JointFriction> {
     let count = points.len() as f64;
-    let middle = |of: usize| points.iter().map(|point| point[of]).sum::<f64>() / count;
-    let (friction, speed) = (middle(0), middle(1));
-    let squares: f64 = points.iter().map(|[_, v]| (v - speed).powi(2)).sum();
-    let (slowest, fastest) = points.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), [_, v]| (a.min(*v), b.max(*v)));
+    // Their sum is that of as many points.
+    let whole = count / points.iter().map(|(_, weight)| weight).sum::<f64>();
+    let sum = |of: &dyn Fn(f64, f64) -> f64| points.iter().map(|([f, v], w)| w * whole * of(*f, *v)).sum::<f64>();
+    let (friction, speed) = (sum(&|f, _| f) / count, sum(&|_, v| v) / count);
+    let squares = sum(&|_, v| (v - speed).powi(2));
+    let (slowest, fastest) = points.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), ([_, v], _)| (a.min(*v), b.max(*v)));
     if fastest - slowest < LEAST_RANGE {
         return None;
     }
-    let viscous = points.iter().map(|[f, v]| (v - speed) * (f - friction)).sum::<f64>() / squares;
+    let viscous = sum(&|f, v| (v - speed) * (f - friction)) / squares;
     let coulomb = friction - viscous * speed;
-    let left: f64 = points.iter().map(|[f, v]| (f - coulomb - viscous * v).powi(2)).sum();
+    let left = sum(&|f, v| (f - coulomb - viscous * v).powi(2));
     let variance = left / (count - 2.0);
     Some(JointFriction {
         coulomb: Estimate { value: coulomb, error: (variance * (1.0 / count + speed * speed / squares)).sqrt() },

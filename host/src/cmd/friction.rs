@@ -38,7 +38,7 @@ pub(super) fn run(command: &Friction, client: &mut Client<Device>, global: &Glob
     let weight = procedure::weight_in_use(client).map_err(|error| connection::failure(error, DOING))?;
     let (postures, speeds) = (POSTURES.len(), DURATIONS.len());
     global.output().say(format!(
-        "the arm moves through {postures} postures at {speeds} speeds, some two minutes; Ctrl-C stops it"
+        "the arm moves through {postures} postures at {speeds} speeds, some three minutes; Ctrl-C stops it"
     ));
     let spinner = global.output().spinner("measuring friction");
     let measured = procedure::slide_postures(client, POSTURES, &DURATIONS, |posture| {
