@@ -127,14 +127,6 @@ fn the_loop_is_stable_on_a_frictionless_arm_with_two_cycles_of_delay() {
 }
 
 #[test]
-fn x_of_the_planned_joints_tracks_as_well_but_lets_friction_stand() {
-    let mut rig = Rig::<f32>::new(START, 1);
-    let quality = run(&mut rig, RunOptions { ..RunOptions::default() });
-    println!("planned: {quality:.5?}");
-    assert!(quality.position_rms <= 6e-3, "{quality:?}");
-}
-
-#[test]
 fn approach_arrives_slowly_enough_and_holds() {
     // From the home posture, outside two soft limits, where the arm is switched on.
     let mut rig = Rig::<f32>::new(model::HOME, 1);
