@@ -95,7 +95,7 @@ impl ClosedLoop {
         let mut plant = Plant::at(posture_and_hand(&primitive.movement().start().points).0);
         let slowest = course.changes.iter().filter_map(Change::speed).fold(speed, f64::min);
         let expected = (primitive.movement().duration() / slowest / PERIOD).ceil();
-        let mut last = SETTLING + (expected * (1.0 + OVERTIME)) as u64 + u64::from(periods(3.0));
+        let mut last = SETTLING + (expected * (1.0 + OVERTIME)) as u64 + u64::from(periods(6.0));
         if course.goal != link::Goal::default() || !course.changes.is_empty() {
             last += u64::from(periods(GOAL_CHANGE)) + expected as u64;
         }

@@ -16,6 +16,7 @@ use crate::model::friction;
 use crate::plan::approach::Approach;
 use crate::plan::lift::Lift;
 use crate::plan::reference::JointReference;
+use crate::plan::run::Run;
 use crate::real::{Real, at_least, at_most, sqrt, within};
 use crate::sense::drift::Drift;
 use crate::sense::joints::JointState;
@@ -214,6 +215,21 @@ pub(super) struct Running<R: Real> {
     pub(super) settling: Settling<R>,
     /// Height to which a grip has been raised, and its load.
     pub(super) lift: Lift<R>,
+}
+
+impl<R: Real> Running<R> {
+    /// True if the movement is over, and the arm is not waited for any more.
+    pub(super) fn ends<const N: usize>(&self, run: &Run<R, N>) -> bool {
+        run.is_over() && !(run.waits() && self.is_seeking())
+    }
+
+    /// True if the arm touches nothing, and is still on its way to its plan.
+    ///
+    /// Not inlined: it is asked once a run is over.
+    #[inline(never)]
+    fn is_seeking(&self) -> bool {
+        self.settling.is_seeking() && (self.drift.is_free() || self.lift.carries())
+    }
 }
 
 /// The tool against the plan in the last cycle.

@@ -531,7 +531,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return false;
         }
         match &self.law {
-            Law::Run(_) => self.run.as_ref().is_none_or(Run::is_over),
+            Law::Run(running) => self.run.as_ref().is_none_or(|run| running.ends(run)),
             Law::Posture(Posture { approach: Some(approach), integral, .. }) => {
                 let rests = integral.is_settled() && self.fastest(measured) < R::constant(STANDING);
                 approach.is_overdue() || (approach.is_finished() && rests)

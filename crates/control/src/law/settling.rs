@@ -14,6 +14,8 @@
 //! joint that presses against what the sensor measures is given up, because friction that was made up for along a plan
 //! is not there once the plan is stopped. Once the hand grips, it fades: with what it holds the arm turns round, and
 //! friction with it. What is raised and weighs what was expected (`plan::lift`) is no touch any more.
+//!
+//! A run waits for a joint that is still beyond the accuracy of a held posture.
 
 use crate::law::integral::TOLERANCE;
 use crate::model::wam7;
@@ -57,12 +59,20 @@ pub struct Settling<R: Real> {
     torque: Vector7<R>,
     /// The joint whose turn it is.
     turn: u8,
+    /// A bit for each joint that was beyond its tolerance in its last turn, and that more torque is still to come to.
+    seeking: u8,
 }
 
 impl<R: Real> Settling<R> {
     /// No torque.
     pub fn new() -> Self {
-        Settling { torque: Vector7::zeros(), turn: 0 }
+        Settling { torque: Vector7::zeros(), turn: 0, seeking: 0 }
+    }
+
+    /// True if a joint is farther from its plan than the accuracy of a held posture, and more torque can still bring it
+    /// there.
+    pub fn is_seeking(&self) -> bool {
+        self.seeking != 0
     }
 
     /// The torque (N m).
@@ -74,6 +84,7 @@ impl<R: Real> Settling<R> {
     #[inline(never)]
     pub fn fade(&mut self) {
         let joint = self.take_turn();
+        self.seeking = 0;
         self.torque[joint] *= R::constant(1.0 - TURNS * PERIOD / FADING);
     }
 
@@ -82,6 +93,7 @@ impl<R: Real> Settling<R> {
     #[inline(never)]
     pub fn give_way(&mut self, pressing: &Vector7<R>) {
         let joint = self.take_turn();
+        self.seeking = 0;
         let (torque, zero) = (self.torque[joint], R::constant(0.0));
         let left = torque + pressing[joint] * R::constant(YIELDING * TURNS * PERIOD);
         if torque > zero {
@@ -123,6 +135,8 @@ impl<R: Real> Settling<R> {
         }
         let moved = self.torque[joint] + rate * R::constant(TURNS * PERIOD) + given(joint) * R::constant(TURNS);
         self.torque[joint] = within(moved, clamp);
+        let rests = error == within(error, R::constant(TOLERANCE[joint])) || moved != self.torque[joint];
+        self.seeking = self.seeking & !(1 << joint) | u8::from(!rests) << joint;
     }
 }
 
@@ -223,7 +237,7 @@ mod tests {
 
     #[test]
     fn a_grip_takes_the_torque_of_every_joint_away() {
-        let mut settling = Settling { torque: Vector7::from(CLAMP), turn: 0 };
+        let mut settling = Settling { torque: Vector7::from(CLAMP), turn: 0, seeking: 0 };
         for _ in 0..(3.0 * FADING / PERIOD) as u32 {
             settling.fade();
         }
@@ -241,7 +255,7 @@ mod tests {
     fn what_presses_against_force_control_is_given_up_and_nothing_else() {
         for sign in [1.0, -1.0] {
             let all = Vector7::from(CLAMP) * sign;
-            let mut settling = Settling { torque: all, turn: 0 };
+            let mut settling = Settling { torque: all, turn: 0, seeking: 0 };
             assert_eq!(given_way(&mut settling, 0.1 * sign), all, "it presses where the force goes");
             let left = (Vector7::from(CLAMP).add_scalar(-0.1 * YIELDING * TURNS * PERIOD)).map(|left| left.max(0.0));
             assert!((given_way(&mut settling, -0.1 * sign) - left * sign).amax() < 1e-12, "{}", settling.torque);

@@ -35,10 +35,15 @@ const HAND_REST: f64 = 5e-2;
 /// pose feedback of Eq (11), so that the arm has closed the last millimetres.
 const SETTLING: u16 = periods(1.0);
 
+/// Time from the end of the movement in which an arm that touches nothing may come to its goal: 5 s, in control
+/// periods.
+const ARRIVING: u16 = periods(5.0);
+
 /// Progress beyond the end from which a plan that never comes to rest is over as well.
 const OVERTIME: f64 = 0.5;
 
-/// The same for a run that the feedback bends: it never comes to rest while something presses.
+/// The same for a run that the feedback bends: it never comes to rest while something presses. At least [`SETTLING`],
+/// or the arm of a short run would be held in the middle of its movement.
 const OVERTIME_WITH_FEEDBACK: f64 = 0.15;
 
 /// Progress that a plan needs to follow a goal that has stopped moving: seven time constants of the usual spring.
@@ -93,6 +98,8 @@ pub(crate) struct Run<R: Real, const N: usize> {
     /// The movement has ended, and the plan stays as the feedback has bent it.
     settled: bool,
     rested: u16,
+    /// Control periods since the movement has ended.
+    ended: u16,
     /// Control periods of braking that are left, [`BRAKING`] times as many.
     braking: u16,
     goal: GoalFilter<R>,
@@ -100,8 +107,10 @@ pub(crate) struct Run<R: Real, const N: usize> {
     end: R,
     /// Part of the speed limits that the plan uses.
     load: R,
-    /// Speed factor that was asked for, and whether it is held to [`SLOW`].
-    speed: (f32, bool),
+    /// Speed factor that was asked for.
+    speed: f32,
+    /// It is held to [`SLOW`].
+    slow: bool,
 }
 
 impl<R: Real, const N: usize> Run<R, N> {
@@ -152,11 +161,13 @@ impl<R: Real, const N: usize> Run<R, N> {
             kept: FADE,
             settled: false,
             rested: 0,
+            ended: 0,
             braking: BRAKING_FULL,
             goal: GoalFilter::at(primitive.movement().goal().poses[0]),
             end: R::constant(1.0),
             load: R::constant(0.0),
-            speed: (options.speed, false),
+            speed: options.speed,
+            slow: false,
         };
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
         run.rollout.set_speed_slew(None).map_err(reason)?;
@@ -173,7 +184,7 @@ impl<R: Real, const N: usize> Run<R, N> {
         if *goal != Goal::STORED {
             let (position, orientation) = checked_goal(&self.rollout, primitive, goal)?;
             self.goal.command(position, orientation);
-            self.rested = 0;
+            (self.rested, self.ended) = (0, 0);
         }
         Ok(())
     }
@@ -249,17 +260,17 @@ impl<R: Real, const N: usize> Run<R, N> {
         if !(factor >= SPEEDS.0 && factor <= SPEEDS.1) {
             return Err(Refusal::OutOfRange);
         }
-        let held = if self.speed.1 && factor > SLOW { SLOW } else { factor };
+        let held = if self.slow && factor > SLOW { SLOW } else { factor };
         set_speed(&mut self.rollout, primitive, held)?;
-        self.speed.0 = factor;
+        self.speed = factor;
         Ok(())
     }
 
     /// Holds the speed to half of the taught one, or lets it go back to what was asked for.
     pub(crate) fn hold_back(&mut self, primitive: &Primitive<R, N>, slow: bool) {
-        self.speed.1 = slow;
+        self.slow = slow;
         // The factor was accepted before, and a slower one always is.
-        let _ = self.set_speed(primitive, self.speed.0);
+        let _ = self.set_speed(primitive, self.speed);
     }
 
     /// The plan of this tick; `grasp` is that of the hand.
@@ -327,7 +338,9 @@ impl<R: Real, const N: usize> Run<R, N> {
         let slow = |speeds: &[R], limit: f64| {
             speeds.iter().all(|speed| *speed < R::constant(limit) && *speed > R::constant(-limit))
         };
-        let resting = self.is_finished()
+        let finished = self.is_finished();
+        self.ended = if finished { self.ended.saturating_add(1) } else { 0 };
+        let resting = finished
             && plan.poses.iter().all(|pose| slow(&pose.position.v, REST.0) && slow(&pose.orientation.omega, REST.1))
             && slow(&posture, REST.1)
             && slow(&hand, HAND_REST);
@@ -376,7 +389,13 @@ impl<R: Real, const N: usize> Run<R, N> {
     /// True if the movement is over.
     pub(crate) fn is_over(&self) -> bool {
         let overtime = if self.options.feedback { OVERTIME_WITH_FEEDBACK } else { OVERTIME };
-        self.rested >= SETTLING || self.rollout.progress() > self.end + R::constant(overtime)
+        let is_overdue = self.ended >= SETTLING && self.rollout.progress() > self.end + R::constant(overtime);
+        self.rested >= SETTLING || is_overdue
+    }
+
+    /// True as long as an arm that is still on its way to its goal is waited for.
+    pub(crate) fn waits(&self) -> bool {
+        self.ended < ARRIVING
     }
 
     /// The expected sensor values and the deviation from them, as of the last complete tick; `None` without an

@@ -75,8 +75,8 @@ impl<R: Real> Drift<R> {
         self.touched
     }
 
-    /// Takes the deviation of this control period (N, N m, sensor axes); returns the change of the tare.
-    pub fn step(&mut self, deviation: &Vector6<R>) -> Vector6<R> {
+    /// Takes the deviation of this control period (N, N m, sensor axes), and with it whether something is touched.
+    pub fn feel(&mut self, deviation: &Vector6<R>) {
         // What deviates when the run begins has not come fast.
         let mean = self.mean.get_or_insert(*deviation);
         let change = deviation - *mean;
@@ -86,11 +86,14 @@ impl<R: Real> Drift<R> {
         let (force, torque) = if self.touched { (GONE_FORCE, GONE_TORQUE) } else { (FREE_FORCE, FREE_TORQUE) };
         let free = !touches && is_within(deviation, force, torque);
         self.quiet = if free { self.quiet.saturating_add(1) } else { 0 };
-        if !self.is_free() {
-            return Vector6::zeros();
+        if self.is_free() {
+            self.touched = false;
+            self.settling = self.settling.saturating_sub(1);
         }
-        self.touched = false;
-        self.settling = self.settling.saturating_sub(1);
+    }
+
+    /// Takes a deviation in free motion for an error of the sensor, as far as one goes; returns the change of the tare.
+    pub fn follow(&mut self, deviation: &Vector6<R>) -> Vector6<R> {
         let mut change = Vector6::zeros();
         for (((change, deviation), followed), largest) in
             change.iter_mut().zip(deviation.iter()).zip(self.followed.iter_mut()).zip(&LARGEST)
@@ -128,7 +131,9 @@ mod tests {
         for tick in 0..(seconds * RATE) as u32 {
             deviation = error(f64::from(tick) * PERIOD) - tare;
             worst = f64::max(worst, f64::abs(deviation));
-            tare += drift.step(&Vector6::new(deviation, 0.0, 0.0, 0.0, 0.0, 0.0))[0];
+            let sample = Vector6::new(deviation, 0.0, 0.0, 0.0, 0.0, 0.0);
+            drift.feel(&sample);
+            tare += if drift.is_free() { drift.follow(&sample)[0] } else { 0.0 };
         }
         (deviation, worst)
     }
@@ -185,7 +190,11 @@ mod tests {
     /// Number of the cycle in which a deviation that is there from the beginning is first followed.
     fn followed_in(deviation: [f64; 6]) -> Option<u16> {
         let mut drift = Drift::<f64>::new();
-        (1..=2 * QUIET).find(|_| drift.step(&Vector6::from(deviation)) != Vector6::zeros())
+        let sample = Vector6::from(deviation);
+        (1..=2 * QUIET).find(|_| {
+            drift.feel(&sample);
+            drift.is_free() && drift.follow(&sample) != Vector6::zeros()
+        })
     }
 
     #[test]

@@ -266,8 +266,9 @@ impl<R: Real> WrenchEstimator<R> {
         sqrt(force.dot(&force))
     }
 
-    /// Moves the tare by what deviates from the expected wrench, as far as that is an error of the sensor; nothing
-    /// moves without an expectation.
+    /// Tells by the deviation from the expected wrench whether something is touched, and moves the tare by as much of
+    /// it as is an error of the sensor. Without an expectation nothing is expected, and the tare stays: the wrench
+    /// has the inertia of the hand in it.
     ///
     /// Not inlined: it runs from flash on a board whose fast memory is full.
     #[inline(never)]
@@ -278,13 +279,18 @@ impl<R: Real> WrenchEstimator<R> {
         deviation: Option<&Deviation<R>>,
         frames: &Frames<R>,
     ) {
-        let Some(Deviation { expected, .. }) = deviation else { return };
+        let nothing = Wrench::zero();
+        let expected = deviation.map_or(&nothing, |deviation| &deviation.expected);
         let to_world = frames.sensor_to_world();
         let force = measured.force - expected.force;
         let torque =
             frames.tool_to_world() * (measured.torque - expected.torque) - frames.tool_to_sensor().cross(&force);
         let (force, torque) = (to_world.tr_mul(&force), to_world.tr_mul(&torque));
-        self.tare += drift.step(&Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z));
+        let change = Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+        drift.feel(&change);
+        if deviation.is_some() && drift.is_free() {
+            self.tare += drift.follow(&change);
+        }
     }
 
     /// The wrench of the environment on the robot at the grasp point; zero if none has been measured.
@@ -359,6 +365,20 @@ mod tests {
         let turned = frames([0.3, 0.9, -0.4, 1.6, -1.5, 0.9, -1.0]);
         let left = follow(&mut estimator, &mut drift, &error(1.0), &turned);
         assert!(left.force.norm() < 0.01 && left.torque.norm() < 0.002, "{left:?}");
+    }
+
+    /// The inertia of a hand of which nothing is expected is measured as well, and is to be recorded.
+    ///
+    /// The change that makes it fail: the tare follows without an expectation.
+    #[test]
+    fn without_an_expectation_free_motion_is_told_and_the_tare_stays() {
+        let (mut estimator, mut drift) = (tared(), Drift::new());
+        let here = frames([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]);
+        for _ in 0..900 {
+            estimator.update(Some(&sample([0.3, 0.0, 0.0], [0.0; 3])), Some(&Vector6::zeros()), false);
+            estimator.follow(&mut drift, &estimator.wrench(&here), None, &here);
+        }
+        assert!(drift.is_free() && (estimator.wrench(&here).force.norm() - 0.3).abs() < 0.01);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The whole control cycle against a simulated arm.
 
 mod adaptation;
+mod arriving;
 mod authority;
 mod caution;
 mod contact;

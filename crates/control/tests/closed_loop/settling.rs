@@ -129,7 +129,7 @@ fn carrying(friction: f64, beyond: f64) -> f64 {
     rig.plant.model = heavier();
     rig.plant.push[2] = -beyond;
     let mut off = f64::MAX;
-    for _ in 0..control::time::periods(12.0) {
+    for _ in 0..control::time::periods(16.0) {
         let record = rig.tick(None).record;
         if record.state != State::Run {
             break;
