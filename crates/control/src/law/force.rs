@@ -1,13 +1,14 @@
 //! `ForceController`: proportional and windowed integral force control.
 //!
-//! Eq (12): `tau = -J^T (e + K_i integral_{t-Dt}^{t} e dt)`, `e = F_expected - F`, `F` the wrench of the environment on
-//! the robot. With this sign it is negative feedback: a wall that pushes too little is pressed harder. The window makes
-//! the integral a box filter of gain `K_i Dt`; against a rigid wall the force settles at `F_expected G/(1+G)`,
+//! Eq (12): `tau = -J^T (P e + K_i integral_{t-Dt}^{t} e dt)`, `e = F_expected - F`, `F` the wrench of the environment
+//! on the robot. With this sign it is negative feedback: a wall that pushes too little is pressed harder. The window
+//! makes the integral a box filter of gain `K_i Dt`; against a rigid wall the force settles at `F_expected G/(1+G)`,
 //! `G = P + K_i Dt`. `F` has to be low-passed before it comes here: with unit gain and a tick of delay a stiff contact
 //! is marginally stable.
 
 use pinned_init::{Init, init};
 
+use crate::law::gains::FORCE_AT_REST;
 use crate::law::window::Window;
 use crate::real::{Real, at_least, at_most, sqrt};
 use crate::time::{PERIOD, periods};
@@ -21,9 +22,9 @@ pub const WINDOW_CAPACITY: usize = periods(0.5) as usize;
 const UNCONFIRMED: [f64; 2] = [5.0, 0.5];
 
 /// Most that may be applied along a push, in parts of the push, if that is more than `UNCONFIRMED`. It is the gain of
-/// Eq (12) at rest in a compliant run, `P + K_i Dt`: nothing presses back on a hand that gives way (decision 0131). At
-/// most twice `UNCONFIRMED`, all that Eq (12) commands: a light push does not release what is expected (decision 0133).
-const GIVING: f64 = 5.0;
+/// Eq (12) at rest in a compliant run: nothing presses back on a hand that gives way (decision 0131). At most twice
+/// `UNCONFIRMED`, all that Eq (12) commands: a light push does not release what is expected (decision 0133).
+const GIVING: f64 = FORCE_AT_REST;
 
 /// Fastest rise of what counts as confirmed (N/s, N m/s). A guard, not measured: the sensor also feels the inertia of
 /// the hand, which "presses back" while the hand is thrown.

@@ -6,7 +6,7 @@
 
 use crate::model::wam7;
 use crate::real::Real;
-use crate::time::periods;
+use crate::time::{PERIOD, periods};
 use crate::units::Vector7;
 
 /// Numbers of one way to track, before they are turned into the number type of the control code.
@@ -32,7 +32,8 @@ const STIFF: Numbers = Numbers {
     clamp: [0.10, 0.10, 0.10, 0.10, 0.20, 0.15, 0.20],
     pose: 2.0,
     posture: 1.0,
-    force: (1.0, 2.0),
+    // What comes fast is the inertia of the hand, which drives the cables where there is no friction.
+    force: (0.1, 2.0),
     moment_share: 1.0,
     force_window: periods(0.2) as usize,
     force_limit: (10.0, 1.0),
@@ -47,7 +48,7 @@ const COMPLIANT: Numbers = Numbers {
     clamp: [0.3; 7],
     pose: 3.0,
     posture: 1.0,
-    force: (1.0, 8.0),
+    force: (0.8, 8.0),
     moment_share: 0.4,
     force_window: periods(0.5) as usize,
     // With what pushes, less than what bends the spring by the 0.3 m from which on an arm is off its plan.
@@ -55,6 +56,9 @@ const COMPLIANT: Numbers = Numbers {
     // Along a plan that bends, a steeper sign is a gain that swings an arm without friction.
     friction_speed: 0.05,
 };
+
+/// Gain of Eq (12) at rest in a compliant run, `P + K_i Dt`.
+pub(crate) const FORCE_AT_REST: f64 = COMPLIANT.force.0 + COMPLIANT.force.1 * COMPLIANT.force_window as f64 * PERIOD;
 
 /// Fraction of the model's Coulomb friction that is fed forward. Below 1, so that too large an estimate never drives.
 const FRICTION_FRACTION: f64 = 0.8;

@@ -408,7 +408,7 @@ fn compliant_runs() -> [(&'static str, Option<[f64; 6]>, RunOptions, usize); 4] 
         ("open, no expectation", None, open, 1),
         ("open", nothing, open, 1),
         ("force", nothing, RunOptions { force_control: true, ..open }, 3),
-        ("adapt", nothing, adapting(), 2),
+        ("adapt", nothing, adapting(), 3),
     ]
 }
 

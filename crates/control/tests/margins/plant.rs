@@ -65,6 +65,8 @@ pub(crate) struct Plant {
     queue: VecDeque<Vector7<f64>>,
     /// Torque at rest, from which on the gain counts; `None` until the arm has come to rest.
     still: Option<Vector7<f64>>,
+    /// The motors are braked: the arm comes to rest, whatever the loop does.
+    pub(crate) braked: bool,
     /// Where the hand touches the wall (m).
     anchor: Option<Vector3<f64>>,
     /// Force that pushes the hand at the grasp point (N, world axes).
@@ -94,6 +96,7 @@ impl Plant {
             rotors,
             queue: (0..LATENCY + variation.delay).map(|_| gravity).collect(),
             still: None,
+            braked: true,
             anchor: None,
             push: Vector3::zeros(),
             calibration: calibration.expect("scales"),
@@ -118,6 +121,7 @@ impl Plant {
     /// From now on the arm is touched by its wall, and its gain is that of the variation.
     pub(crate) fn settle(&mut self) {
         self.still = self.queue.back().copied();
+        self.braked = false;
         self.anchor = Some(self.frames().tool_pose().position);
     }
 
@@ -165,7 +169,7 @@ impl Plant {
         for _ in 0..SUBSTEPS {
             self.queue.push_back(torque);
             let motor = self.queue.pop_front().expect("just pushed");
-            let brake = if self.still.is_none() { BRAKE * dt } else { 0.0 };
+            let brake = if self.braked { BRAKE * dt } else { 0.0 };
             self.omega /= 1.0 + brake;
             let cable = self.stiffness.component_mul(&(self.theta - self.q))
                 + self.damping.component_mul(&(self.omega - self.dq));
