@@ -9,6 +9,7 @@ use kuva::render::color::Color;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
 use super::PlotError;
+use super::pixels::Pixels;
 
 /// A colour as `#rrggbb`.
 pub type Colour = &'static str;
@@ -25,6 +26,9 @@ pub const PALE: Colour = "#ededed";
 pub const BAND: Colour = "#d9d9d9";
 /// Limits.
 pub const LIMIT: Colour = "#000000";
+
+/// Direction of a text that reads upwards, degrees.
+const UPWARD: f64 = -90.0;
 
 /// Where a text stands relative to its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,7 +138,7 @@ impl Drawing {
 
     /// A line of text that reads upwards, its middle at the point.
     pub fn upward_text(&mut self, at: [f64; 2], content: impl Into<String>, size: u32, colour: Colour) {
-        self.put_text(at, content.into(), size, Anchor::Middle, colour, Some(-90.0));
+        self.put_text(at, content.into(), size, Anchor::Middle, colour, Some(UPWARD));
     }
 
     fn put_text(
@@ -173,7 +177,34 @@ impl Drawing {
     /// # Errors
     /// The encoder's error.
     pub fn to_png(&self, scale: f32) -> Result<Vec<u8>, String> {
-        RasterBackend::new().with_scale(scale).render_scene(&self.scene)
+        let Scene { width, height, .. } = self.scene;
+        let (mut page, mut sheet) = (Scene::new(width, height), Scene::new(height, width));
+        // What the plotting crate turns is jagged: upward texts stand level on a sheet of their own, which is turned.
+        for element in &self.scene.elements {
+            match element {
+                Primitive::Text { x, y, content, size, anchor, rotate: Some(UPWARD), bold, color } => {
+                    sheet.elements.push(Primitive::Text {
+                        x: height - y,
+                        y: *x,
+                        content: content.clone(),
+                        size: *size,
+                        anchor: *anchor,
+                        rotate: None,
+                        bold: *bold,
+                        color: color.clone(),
+                    });
+                }
+                other => page.elements.push(other.clone()),
+            }
+        }
+        let pixels = RasterBackend::new().with_scale(scale);
+        let file = pixels.render_scene(&page)?;
+        if sheet.elements.is_empty() {
+            return Ok(file);
+        }
+        let mut printed = Pixels::decode(&file)?;
+        printed.print_turned(&Pixels::decode(&pixels.render_scene(&sheet)?)?);
+        printed.encode()
     }
 
     /// Writes the page as `NAME.svg` and `NAME.png` into `folder`.
@@ -319,6 +350,21 @@ mod tests {
             assert!((length - 3.0).abs() < 1e-9, "{length}");
             assert!(piece.iter().all(|point| point[1] == 2.0));
         }
+    }
+
+    /// The change that makes it fail: the plotting crate turns the letters itself, and every pixel that they touch is
+    /// as dark as its middle.
+    #[test]
+    fn the_letters_of_an_upward_text_are_those_of_a_level_one() {
+        let (mut level, mut upward) = (Drawing::new(100.0, 40.0), Drawing::new(40.0, 100.0));
+        level.text([50.0, 24.0], "force (N)", 14, Anchor::Middle, INK);
+        upward.upward_text([24.0, 50.0], "force (N)", 14, INK);
+        let pixels = |drawing: &Drawing| Pixels::decode(&drawing.to_png(1.0).unwrap()).unwrap();
+        let (level, upward) = (pixels(&level), pixels(&upward));
+        let places = || (0..100).flat_map(|x| (0..40).map(move |y| (x, y)));
+        let differ = places().filter(|(x, y)| level.at(*x, *y) != upward.at(*y, 99 - x)).count();
+        assert_eq!(differ, 0);
+        assert!(places().any(|(x, y)| level.at(x, y)[0] < 60), "there are letters");
     }
 
     #[test]

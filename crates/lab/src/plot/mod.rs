@@ -3,6 +3,7 @@
 pub mod canvas;
 pub mod drawing;
 pub mod movement;
+mod pixels;
 
 use std::path::{Path, PathBuf};
 
