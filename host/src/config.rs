@@ -76,15 +76,14 @@ impl Config {
     /// # Errors
     /// It cannot be read, has a word that means nothing, or a value out of its range.
     pub fn read(path: &Path) -> Result<Self, Failure> {
-        let failure = |cause: String| {
-            Failure::new(ErrorCode::Configuration, format!("reading {}", path.display()), cause.trim_end().to_owned())
-        };
+        let failure =
+            |cause: String| Failure::new(ErrorCode::Configuration, format!("reading {}", path.display()), cause);
         let text = match input_file::read_text(path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Self::default()),
             Err(error) => return Err(failure(error.to_string())),
         };
-        let config: Self = toml::from_str(&text).map_err(|error| failure(error.to_string()))?;
+        let config: Self = toml::from_str(&text).map_err(|error| failure(input_file::parser_words(&error)))?;
         let texts = [("device", &config.device), ("secret_file", &config.secret_file)];
         if let Some((name, _)) = texts.into_iter().find(|(_, text)| text.as_ref().is_some_and(String::is_empty)) {
             return Err(failure(format!("{name} = \"\": it is empty; give it a value, or leave out the line")));

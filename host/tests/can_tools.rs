@@ -186,6 +186,28 @@ fn garbage_is_reported_with_line_numbers_and_the_rest_is_decoded() {
     assert!(out.contains("3 unknown frames"), "{out}");
 }
 
+/// The change that makes it fail: only a newline ends a line, or both of its characters count as one each.
+#[test]
+fn a_log_whose_lines_end_in_carriage_returns_is_read_and_its_lines_are_numbered() {
+    let lines = ["(1.000000) can0 404#30", "hello", "(1.000100) can0 423#8010", "world"];
+    let decoded = |text: &str| {
+        let (folder, _file) = log_file(text);
+        let run = tactus(folder.path(), &["can", "decode", "bus.log"]).code(6);
+        (stdout(&run), stderr(&run))
+    };
+    let usual = decoded(&lines.join("\n"));
+    assert!(usual.1.contains("line 2: ") && usual.1.contains("line 4: "), "{}", usual.1);
+    for end in ["\r", "\r\n"] {
+        assert_eq!(decoded(&lines.join(end)), usual, "{end:?}");
+    }
+    // Longer than one line can be.
+    let (_, log) = recorded();
+    let part: String = log.lines().take(2000).map(|line| format!("{line}\r")).collect();
+    let (folder, _file) = log_file(&part);
+    let text = stdout(&tactus(folder.path(), &["can", "decode", "bus.log"]).success());
+    assert!(text.lines().count() > 2000, "{}", text.lines().count());
+}
+
 #[test]
 fn json_is_one_object_a_line_and_the_summary_last() {
     let (folder, _file) = log_file("(1.000000) can0 404#30\n(1.000200) can0 423#801000\n");

@@ -38,6 +38,7 @@ mod secret;
 mod settings;
 mod stand_in;
 mod storage;
+mod strange_files;
 mod tare;
 mod warnings;
 mod weighing;

@@ -94,7 +94,7 @@ fn a_mark_of_utf_8_and_blank_lines_do_not_hide_the_movement_that_a_recording_nam
     }
 }
 
-/// The change that makes it fail: `with_newlines` gives the bytes as they are.
+/// The change that makes it fail: `input_file::with_newlines` gives the bytes as they are.
 #[test]
 fn a_recording_whose_lines_end_in_carriage_returns_alone_is_read_with_its_notes_and_lines() {
     let lines = format!("# primitive: reach 0x0a1b2c3d\n{}\n", good().join("\n"));

@@ -3,7 +3,6 @@
 //! Reading parses, it does not merely validate: a `Recording` that exists has strictly increasing time, finite
 //! numbers, whole groups of columns and unit quaternions whose sign does not jump.
 
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use crate::input_file;
@@ -98,7 +97,7 @@ impl Recording {
     /// # Errors
     /// The first thing that is wrong, with its line and column.
     pub fn parse(file: &Path, bytes: &[u8]) -> Result<Recording, RecordingError> {
-        let table = Table::parse(file, &with_newlines(bytes))?;
+        let table = Table::parse(file, &input_file::with_newlines(bytes))?;
         let mut missing: Vec<String> = Vec::new();
         if table.column(layout::TIME).is_none() {
             missing.push(layout::TIME.to_owned());
@@ -232,19 +231,10 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     link::frame::CRC.checksum(bytes)
 }
 
-/// The bytes with their lines ended by newlines: some spreadsheets end them with carriage returns alone, which would
-/// make one note of the whole file.
-fn with_newlines(bytes: &[u8]) -> Cow<'_, [u8]> {
-    if bytes.contains(&b'\n') || !bytes.contains(&b'\r') {
-        return Cow::Borrowed(bytes);
-    }
-    Cow::Owned(bytes.iter().map(|byte| if *byte == b'\r' { b'\n' } else { *byte }).collect())
-}
-
 /// The notes before the header, without their sign. A spreadsheet puts a mark of UTF-8 before the first one, and blank
 /// lines may stand between them.
 pub fn notes(bytes: &[u8]) -> Vec<String> {
-    let bytes = with_newlines(bytes);
+    let bytes = input_file::with_newlines(bytes);
     let lines = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&bytes).split(|byte| *byte == b'\n');
     let filled = lines.filter(|line| !line.trim_ascii().is_empty());
     let notes = filled.map_while(|line| line.strip_prefix(b"#"));

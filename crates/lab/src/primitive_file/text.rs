@@ -5,6 +5,8 @@ use std::path::Path;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
+use crate::input_file;
+
 use super::{PrimitiveFile, PrimitiveFileError, SCHEMA};
 
 /// Columns after which a table of numbers breaks.
@@ -44,7 +46,7 @@ struct Head {
 pub(super) fn parse(file: &Path, text: &str) -> Result<(PrimitiveFile, u32), PrimitiveFileError> {
     let syntax = |error: toml::de::Error| PrimitiveFileError::Syntax {
         file: file.to_owned(),
-        message: error.to_string().trim_end().to_owned(),
+        message: input_file::parser_words(&error),
     };
     let head: Head = toml::from_str(text).map_err(syntax)?;
     if !is_schema(&head.schema) {

@@ -5,6 +5,8 @@ use std::str::FromStr as _;
 use thiserror::Error;
 use toml_edit::{DocumentMut, Item, TableLike, Value, value};
 
+use crate::input_file;
+
 use super::{Key, Setting, Settings};
 
 /// Names the layout of the file.
@@ -20,7 +22,7 @@ const HEAD: &str = "\
 #[derive(Debug, Error)]
 pub enum FileError {
     /// It is no TOML.
-    #[error("{0}")]
+    #[error("{}", input_file::parser_words(.0))]
     Toml(#[from] toml_edit::TomlError),
     /// It has another layout.
     #[error("its `schema` is not {SCHEMA}")]

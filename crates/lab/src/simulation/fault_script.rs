@@ -49,7 +49,7 @@ impl FaultScript {
         let (path, number) = scenario(name);
         let failed = |cause: String| SimulationError::Faults(path.to_owned(), cause);
         let text = input_file::read_text(path).map_err(|cause| failed(cause.to_string()))?;
-        let file: File = toml::from_str(&text).map_err(|cause| failed(cause.to_string()))?;
+        let file: File = toml::from_str(&text).map_err(|cause| failed(input_file::parser_words(&cause)))?;
         let scenario = number.checked_sub(1).and_then(|index| file.scenario.into_iter().nth(index));
         let scenario = scenario.ok_or_else(|| failed(format!("there is no scenario {number}")))?;
         if scenario.inject.is_empty() {

@@ -110,13 +110,7 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         seen.iter().map(|(interface, totals)| totals.sum(&interface.name, &interface.decoder)).collect();
     let damage: Vec<(u32, u32)> = seen.iter().map(|(interface, _)| interface.link.damage()).collect();
     out.summaries(&summaries, &damage, garbage.lines)?;
-    match garbage.first {
-        None => Ok(()),
-        Some(first) => {
-            let cause = format!("{} lines are not in candump's format, the first is line {first}", garbage.lines);
-            Err(Failure::new(ErrorCode::LogLines, DOING, cause))
-        }
-    }
+    garbage.cause().map_or(Ok(()), |cause| Err(Failure::new(ErrorCode::LogLines, DOING, cause)))
 }
 
 /// Writes lines until nobody reads them any more.

@@ -45,12 +45,9 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if !outcome.has_host {
         output.warn("the log does not hold the host's bus: orders are missing, and what they caused will differ");
     }
-    let failure = match (garbage.first, outcome.differences.first()) {
+    let failure = match (garbage.cause(), outcome.differences.first()) {
         (None, None) => return output.result(&outcome, text(&outcome)),
-        (Some(first), _) => {
-            let cause = format!("{} lines are not in candump's format, the first is line {first}", garbage.lines);
-            Failure::new(ErrorCode::LogLines, DOING, cause)
-        }
+        (Some(cause), _) => Failure::new(ErrorCode::LogLines, DOING, cause),
         (None, Some(first)) => {
             let frames =
                 if outcome.different == 1 { "frame of the device differs" } else { "frames of the device differ" };

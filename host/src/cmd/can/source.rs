@@ -1,7 +1,7 @@
 //! Where lines come from: a file, standard input, or an interface.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek, Stdin};
+use std::io::{BufRead, BufReader, ErrorKind, Seek, Stdin};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
@@ -39,10 +39,19 @@ pub(super) struct Garbage {
     /// Their number.
     pub(super) lines: u64,
     /// Number of the first one.
-    pub(super) first: Option<u64>,
+    first: Option<u64>,
 }
 
 impl Garbage {
+    /// What is wrong with the log, if it has such lines.
+    pub(super) fn cause(&self) -> Option<String> {
+        let (first, lines) = (self.first?, self.lines);
+        Some(match lines {
+            1 => format!("one line is not in candump's format: line {first}"),
+            _ => format!("{lines} lines are not in candump's format, the first is line {first}"),
+        })
+    }
+
     /// Tells of a line, as long as there are few of them.
     fn tell(&mut self, number: u64, text: &str, error: &LineError) {
         self.lines += 1;
@@ -54,6 +63,42 @@ impl Garbage {
         } else if self.lines == REPORTED + 1 {
             eprintln!("more such lines are only counted");
         }
+    }
+}
+
+/// True where the last line ended with a carriage return: a newline behind that is no line.
+struct Returned(bool);
+
+impl Returned {
+    /// Reads to the end of a line, whatever it is: a newline, a carriage return or both; at most `room` bytes. Gives
+    /// their number, 0 at the end of the file.
+    fn read_line(&mut self, reader: &mut impl BufRead, room: u64, text: &mut Vec<u8>) -> std::io::Result<usize> {
+        let mut count = 0;
+        while (count as u64) < room {
+            let bytes = match reader.fill_buf() {
+                Err(cause) if cause.kind() == ErrorKind::Interrupted => continue,
+                bytes => bytes?,
+            };
+            if self.0 && bytes.first() == Some(&b'\n') {
+                self.0 = false;
+                reader.consume(1);
+                continue;
+            }
+            let bytes = &bytes[..bytes.len().min(room as usize - count)];
+            let end = bytes.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+            let taken = end.map_or(bytes.len(), |end| end + 1);
+            text.extend_from_slice(&bytes[..taken]);
+            if taken == 0 {
+                break;
+            }
+            self.0 = end.is_some_and(|end| bytes[end] == b'\r');
+            reader.consume(taken);
+            count += taken;
+            if end.is_some() {
+                break;
+            }
+        }
+        Ok(count)
     }
 }
 
@@ -110,6 +155,7 @@ impl Source {
         let mut garbage = Garbage::default();
         let mut number = 0;
         let mut text = Vec::new();
+        let mut returned = Returned(false);
         while !interrupt.is_raised() {
             let (count, follow) = match &mut self {
                 Self::Interface { port, name } => {
@@ -131,25 +177,25 @@ impl Source {
                         let doing = format!("{doing}: cannot read {}", path.display());
                         Failure::of_file(ErrorCode::LogUnreadable, doing, cause)
                     };
-                    (reader.take(room).read_until(b'\n', &mut text).map_err(unreadable)?, *follow)
+                    (returned.read_line(reader, room, &mut text).map_err(unreadable)?, *follow)
                 }
                 Self::Input(reader) => {
                     if reader.buffer().is_empty() && !take(None)? {
                         break;
                     }
-                    let count = reader.take(LONGEST_LINE).read_until(b'\n', &mut text).map_err(|cause| {
+                    let count = returned.read_line(reader, LONGEST_LINE, &mut text).map_err(|cause| {
                         Failure::new(ErrorCode::LogUnreadable, format!("{doing}: cannot read standard input"), cause)
                     })?;
                     (count, false)
                 }
             };
-            let whole = text.ends_with(b"\n");
+            let whole = text.ends_with(b"\n") || text.ends_with(b"\r");
             if text.len() as u64 >= LONGEST_LINE && !whole {
                 let cause = format!("line {} has more than {LONGEST_LINE} bytes", number + 1);
                 return Err(Failure::new(ErrorCode::LogLines, doing, cause));
             }
             if follow && count == 0 && self.starts_anew() {
-                (number, text) = (0, Vec::new());
+                (number, text, returned) = (0, Vec::new(), Returned(false));
                 continue;
             }
             if follow && !whole {

@@ -12,6 +12,7 @@ use experiment::log::Log;
 use experiment::preparation::{self, PreparationError, Teaching};
 use experiment::{Config, ExperimentError, Grid, Mode, PlantKind, Scenario, Variation};
 use lab::client::Interrupt;
+use lab::input_file;
 use lab::primitive_file::PrimitiveFile;
 use lab::simulation::{Engine, SimulationOptions};
 use lab::transport::Address;
@@ -176,10 +177,12 @@ fn object(given: &Path) -> Result<ObjectKind, Failure> {
         let cause = format!("there is no object '{}'; there are {known}, and files NAME.toml", given.display());
         return Err(Failure::new(ErrorCode::UnknownObject, DOING, cause));
     }
-    let text = lab::input_file::read_text(given)
+    let text = input_file::read_text(given)
         .map_err(|cause| Failure::of_file(ErrorCode::FileFailed, format!("{DOING}: {}", given.display()), cause))?;
-    ObjectKind::from_toml(&text)
-        .map_err(|cause| Failure::new(ErrorCode::ObjectInvalid, format!("{DOING} refused {}", given.display()), cause))
+    ObjectKind::from_toml(&text).map_err(|cause| {
+        let doing = format!("{DOING} refused {}", given.display());
+        Failure::new(ErrorCode::ObjectInvalid, doing, input_file::parser_words(&cause))
+    })
 }
 
 /// The arms that are asked for.
