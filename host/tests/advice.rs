@@ -2,47 +2,21 @@
 
 use std::io::Write as _;
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
 use crate::common;
+use crate::tool::{self, Ended, Refusal, command, learned, said, succeeds, tactus};
 
 const DEVICE: &str = "--device sil:world=simple,flash=arm.flash --non-interactive";
-
-fn tactus(folder: &Path, line: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE");
-    command.args(line.split_whitespace()).stdin(Stdio::null()).output().unwrap()
-}
-
-#[track_caller]
-fn succeeds(folder: &Path, line: &str) -> Output {
-    let output = tactus(folder, line);
-    assert!(output.status.success(), "{line}: {}", said(&output));
-    output
-}
 
 /// Code and help of a command that fails.
 #[track_caller]
 fn refused(folder: &Path, line: &str) -> (String, String) {
-    let output = tactus(folder, &format!("--json {line}"));
-    assert!(!output.status.success(), "{line}");
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let word = |key: &str| told["error"][key].as_str().unwrap_or_default().to_owned();
-    (word("code"), word("help"))
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn learned(duration: f64) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    common::demonstration(folder.path(), duration);
-    succeeds(folder.path(), "learn demo.csv -o reach.toml");
-    folder
+    let Refusal { code, help, .. } = tool::refusal(folder, &format!("--json {line}"));
+    (code, help)
 }
 
 #[test]
@@ -190,27 +164,19 @@ fn a_slower_run_is_advised_only_where_it_is_slower_and_can_help() {
 const SERVED: &str = "--device unix:arm.sock";
 
 /// A simulated arm that stays, with its pendant; killed when the test is over.
-struct Served(Child);
+struct Served(Ended);
 
 impl Served {
     fn start(folder: &Path, options: &[&str]) -> Served {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-        command.current_dir(folder).args(["--device", "sil:world=simple", "sim", "--listen", "unix:arm.sock"]);
-        command.args(options);
-        let served = Served(command.stdin(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap());
+        let serve = ["--device", "sil:world=simple", "sim", "--listen", "unix:arm.sock"];
+        let mut command = command(folder, &[&serve, options].concat());
+        let served = Served(Ended(command.stdin(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()));
         wait_until("it listens", || folder.join("arm.sock").exists());
         served
     }
 
     fn press(&mut self, word: &str) {
-        writeln!(self.0.stdin.as_mut().unwrap(), "{word}").unwrap();
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        writeln!(self.0.0.stdin.as_mut().unwrap(), "{word}").unwrap();
     }
 }
 

@@ -1,32 +1,14 @@
 //! `tactus can` on logs of simulated arms, of the golden transcripts, and of nobody.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use assert_cmd::Command;
-use assert_cmd::assert::Assert;
 use canlog::{BusKind, InterfaceTotals, Kind, LogLine, Reader};
 use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::common;
-
-fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
-    Command::new(env!("CARGO_BIN_EXE_tactus"))
-        .current_dir(folder)
-        .env("XDG_CONFIG_HOME", folder)
-        .env_remove("TACTUS_DEVICE")
-        .args(arguments)
-        .assert()
-}
-
-fn stdout(assert: &Assert) -> String {
-    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
-}
-
-fn stderr(assert: &Assert) -> String {
-    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
-}
+use crate::tool::{judged as tactus, stderr, stdout};
 
 /// A whole start-up, an upload and a run on a simulated arm, both buses logged. Made once for all tests.
 fn recorded() -> &'static (TempDir, String) {

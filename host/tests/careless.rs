@@ -1,51 +1,26 @@
 //! The lines of careless people: nothing is lost, and what is wrong is named, for people and for scripts.
 
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 
-use serde_json::Value;
-
-use crate::common;
+use crate::tool::{self, Ended, Refusal, learned};
 
 const DEVICE: &str = "--device sil:world=simple --non-interactive";
 
 fn tactus(folder: &Path, line: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE").arg("--json");
-    command.args(line.split_whitespace()).stdin(Stdio::null()).output().unwrap()
+    tool::tactus(folder, &format!("--json {line}"))
 }
 
 #[track_caller]
 fn succeeds(folder: &Path, line: &str) {
-    let output = tactus(folder, line);
-    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    tool::succeeds(folder, &format!("--json {line}"));
 }
 
 /// Exit code, code, message and help of a command that fails.
 #[track_caller]
 fn refused(folder: &Path, line: &str) -> (i32, String, String, String) {
-    let output = tactus(folder, line);
-    assert!(!output.status.success(), "{line}");
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let word = |key: &str| told["error"][key].as_str().unwrap_or_default().to_owned();
-    (output.status.code().unwrap(), word("code"), word("message"), word("help"))
-}
-
-/// A program that ends with its test, whatever becomes of that.
-struct Ended(Child);
-
-impl Drop for Ended {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn learned() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    common::demonstration(folder.path(), 3.0);
-    succeeds(folder.path(), "learn demo.csv -o reach.toml");
-    folder
+    let Refusal { exit, code, message, help } = tool::refusal(folder, &format!("--json {line}"));
+    (exit, code, message, help)
 }
 
 #[test]
@@ -68,7 +43,7 @@ fn a_script_is_told_what_is_wrong_with_a_command_line_as_a_person_is() {
 /// The device would refuse it: it has been written, and the primitive could not be run any more.
 #[test]
 fn statistics_are_not_put_into_a_primitive_that_no_device_would_take_then() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     succeeds(at, &format!("{DEVICE} run reach.toml --record run.csv"));
     let before = std::fs::read(at.join("reach.toml")).unwrap();
@@ -80,7 +55,7 @@ fn statistics_are_not_put_into_a_primitive_that_no_device_would_take_then() {
 
 #[test]
 fn a_file_where_a_folder_is_expected_is_named_and_the_primitive_stays_as_it_is() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     std::fs::write(at.join("there"), "precious").unwrap();
     let before = std::fs::read(at.join("reach.toml")).unwrap();
@@ -111,7 +86,7 @@ fn an_image_that_is_not_there_is_a_wrong_command_line_and_the_reason_is_told() {
 
 #[test]
 fn a_speed_of_standing_still_that_is_none_is_refused_by_the_name_of_its_option() {
-    let folder = learned();
+    let folder = learned(3.0);
     for value in ["nan", "inf", "-1", "0", "1e9"] {
         let (exit, code, message, _) =
             refused(folder.path(), &format!("learn demo.csv -o a.toml --still-speed {value}"));
@@ -206,7 +181,7 @@ fn a_recording_that_could_not_be_read_again_is_not_made() {
 
 #[test]
 fn what_is_given_twice_is_refused_because_one_of_the_two_would_be_ignored() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     for (line, code, words) in [
         ("--device sil:seed=1,seed=2 status", "E201", "'seed' is given twice"),
@@ -230,7 +205,7 @@ fn what_is_given_twice_is_refused_because_one_of_the_two_would_be_ignored() {
 
 #[test]
 fn a_file_of_another_kind_is_named_once_and_the_help_says_what_it_is_good_for() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     std::fs::write(at.join("nil"), "").unwrap();
     std::fs::create_dir(at.join("nest")).unwrap();
@@ -321,7 +296,7 @@ fn what_is_wrong_with_a_setting_is_told_by_the_place_where_it_was_set() {
 
 #[test]
 fn degrees_and_absurd_numbers_are_told_as_such_on_one_line() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     let (_, code, message, _) = refused(at, "learn demo.csv -o a.toml --hand-goal 0,90,90,90");
     assert!(code == "E200" && message.contains("90 rad: are these degrees?"), "{message}");
@@ -385,7 +360,7 @@ fn options_of_the_simulated_teacher_are_refused_where_there_is_none() {
 /// The changes that make it fail: surroundings that are not there are ignored; nothing is none of the simple world's.
 #[test]
 fn surroundings_are_refused_where_there_are_none() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     let mut serve = Command::new(env!("CARGO_BIN_EXE_tactus"));
     serve.current_dir(at).args(["--device", "sil:world=simple", "sim"]).stdin(Stdio::null());
@@ -415,7 +390,7 @@ fn surroundings_are_refused_where_there_are_none() {
 /// A newcomer leaves out the ending, or expects that a simulated device remembers the last command.
 #[test]
 fn a_primitive_that_is_not_there_is_named_with_the_place_where_it_may_be() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     for line in ["upload reach", "check reach", "rehearse reach"] {
         let (exit, code, message, help) = refused(at, &format!("{DEVICE} {line}"));
@@ -438,7 +413,7 @@ fn a_primitive_that_is_not_there_is_named_with_the_place_where_it_may_be() {
 /// The change that makes it fail: a recording that reads well is a success.
 #[test]
 fn a_run_that_missed_its_goal_is_no_success_and_its_report_says_so() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     succeeds(at, &format!("{DEVICE} run reach.toml --mode open --record run.csv"));
     let text = std::fs::read_to_string(at.join("run.csv")).unwrap();

@@ -1,29 +1,10 @@
 //! The commands as a user or a script sees them: exit codes, what is said where, JSON.
 
-use std::path::Path;
-
-use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use serde_json::Value;
 
 use crate::common;
-
-fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
-    Command::new(env!("CARGO_BIN_EXE_tactus"))
-        .current_dir(folder)
-        .env("XDG_CONFIG_HOME", folder)
-        .env_remove("TACTUS_DEVICE")
-        .args(arguments)
-        .assert()
-}
-
-fn stdout(assert: &Assert) -> String {
-    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
-}
-
-fn stderr(assert: &Assert) -> String {
-    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
-}
+use crate::tool::{judged as tactus, stderr, stdout};
 
 fn json(assert: &Assert) -> Value {
     let text = stdout(assert);

@@ -9,6 +9,7 @@ use clap::CommandFactory;
 use tactus::cmd::Cli;
 
 use crate::common;
+use crate::tool;
 
 /// A command that writes a file: subcommand, the option that names it, the whole line, and the file. It begins with
 /// `reach.toml`, `run.csv` and a device whose flash holds `reach`, and takes the place of a file that is there already.
@@ -49,10 +50,9 @@ fn precious(line: &str, settings: &[u8]) -> Vec<u8> {
 }
 
 fn command(folder: &Path, line: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("XDG_CONFIG_HOME", folder);
-    command.env("TACTUS_DEVICE", "sil:world=simple,flash=arm.flash").args(["--non-interactive", "--force"]);
-    command.args(line.split(' ')).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut command = tool::command(folder, &format!("--non-interactive --force {line}"));
+    command.env("TACTUS_DEVICE", "sil:world=simple,flash=arm.flash");
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }
 

@@ -6,17 +6,10 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
-fn tactus(folder: &Path, variables: &[(&str, &str)], line: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    for name in ["TACTUS_DEVICE", "TACTUS_TIMEOUT", "TACTUS_SECRET_FILE"] {
-        command.env_remove(name);
-    }
-    command.current_dir(folder).env("XDG_CONFIG_HOME", folder).envs(variables.iter().copied());
-    command.args(line.split_whitespace()).stdin(Stdio::null()).output().unwrap()
-}
+use crate::tool::{command, said};
 
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+fn tactus(folder: &Path, variables: &[(&str, &str)], line: &str) -> Output {
+    command(folder, line).envs(variables.iter().copied()).output().unwrap()
 }
 
 fn configure(folder: &Path, text: &str) {

@@ -6,10 +6,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Output, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use crate::common;
+use crate::tool::{self, learned, succeeds};
 
 /// A feature: name, commands, bar, and what is still missing (empty: held).
 type Feature = (&'static str, &'static str, &'static str, &'static str);
@@ -181,29 +181,9 @@ fn the_table_of_features_is_what_the_tests_hold() {
 }
 
 fn command(folder: &Path, line: &str) -> std::process::Command {
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_tactus"));
+    let mut command = tool::command(folder, line);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
     command
-        .current_dir(folder)
-        .env("XDG_CONFIG_HOME", folder)
-        .env_remove("TACTUS_DEVICE")
-        .args(line.split_whitespace());
-    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    command
-}
-
-#[track_caller]
-fn succeeds(folder: &Path, line: &str) -> Output {
-    let output = command(folder, line).output().unwrap();
-    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-    output
-}
-
-/// A folder with the primitive `reach.toml` of so many seconds.
-fn learned(duration: f64) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    common::demonstration(folder.path(), duration);
-    succeeds(folder.path(), "learn demo.csv -o reach.toml");
-    folder
 }
 
 #[test]

@@ -5,49 +5,13 @@ use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
-use assert_cmd::assert::Assert;
 
-use crate::common;
-
-/// The program, in a folder, without a device of the environment.
-fn tactus(folder: &Path, line: &str) -> Assert {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command
-        .current_dir(folder)
-        .env("XDG_CONFIG_HOME", folder)
-        .env_remove("TACTUS_DEVICE")
-        .args(line.split_whitespace())
-        .assert()
-}
+use crate::tool::{self, judged as tactus, learned, names, stderr};
 
 /// The program, started and left to itself.
 fn start(folder: &Path, line: &str) -> std::process::Child {
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command
-        .current_dir(folder)
-        .env("XDG_CONFIG_HOME", folder)
-        .env_remove("TACTUS_DEVICE")
-        .args(line.split_whitespace());
+    let mut command = tool::command(folder, line);
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
-}
-
-fn stderr(assert: &Assert) -> String {
-    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
-
-/// A folder with a demonstration and the primitive learned from it.
-fn learned(duration: f64) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    common::demonstration(folder.path(), duration);
-    tactus(folder.path(), "learn demo.csv -o reach.toml").success();
-    folder
 }
 
 const DEVICE: &str = "--device sil:world=simple --non-interactive";

@@ -6,21 +6,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common;
-
-fn command(folder: &Path, line: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE");
-    command.args(line.split_whitespace()).stdin(Stdio::null());
-    command
-}
-
-fn tactus(folder: &Path, line: &str) -> Output {
-    command(folder, line).output().unwrap()
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
+use crate::tool::{heeding, said, tactus};
 
 /// The program under a shell that lets no file grow: it stands for a full disk.
 fn without_room(folder: &Path, line: &str) -> Output {
@@ -71,10 +57,7 @@ fn a_command_that_is_interrupted_leaves_nothing_unfinished() {
     let deadline = Instant::now() + Duration::from_secs(60);
     for name in ["INT", "TERM", "HUP"] {
         // A shell that starts the tests in the background has them ignore Ctrl-C, and so would the command.
-        let mut child = Command::new("env");
-        child.arg(format!("--default-signal={name}")).arg(env!("CARGO_BIN_EXE_tactus")).current_dir(folder);
-        child.args(["learn", "demo.csv", "-o", "a.toml"]).stdin(Stdio::null()).stderr(Stdio::null());
-        let mut child = child.spawn().unwrap();
+        let mut child = heeding(name, folder, "learn demo.csv -o a.toml").stderr(Stdio::null()).spawn().unwrap();
         while parts(folder).is_empty() {
             assert_eq!(child.try_wait().unwrap(), None, "it ended by itself");
             assert!(Instant::now() < deadline, "it has not begun");

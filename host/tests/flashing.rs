@@ -5,12 +5,12 @@ use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
-use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use link::ImageMetadata;
 use link::metadata::MemoryRegion;
 
 use crate::elf::{elf, real};
+use crate::tool::{command, judge, stderr, stdout};
 
 /// A folder with an image and, if `status` is given, a probe-rs that ends with it.
 fn laboratory(image: &[u8], status: Option<u8>) -> tempfile::TempDir {
@@ -41,21 +41,9 @@ fn calls(folder: &Path) -> Vec<String> {
 }
 
 fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
-    Command::new(env!("CARGO_BIN_EXE_tactus"))
-        .current_dir(folder)
-        .env("XDG_CONFIG_HOME", folder)
-        .env_remove("TACTUS_DEVICE")
-        .env("PATH", folder.join("bin"))
-        .args(arguments)
-        .assert()
-}
-
-fn stderr(assert: &Assert) -> String {
-    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
-}
-
-fn stdout(assert: &Assert) -> String {
-    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
+    let mut command = command(folder, arguments);
+    command.env("PATH", folder.join("bin"));
+    judge(command)
 }
 
 #[test]

@@ -2,31 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
-use assert_cmd::assert::Assert;
 use serde_json::Value;
 
-use crate::common;
-
-fn tactus(folder: &Path, line: &str) -> Assert {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE");
-    command.args(line.split_whitespace()).assert()
-}
-
-fn learned() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    common::demonstration(folder.path(), 3.0);
-    tactus(folder.path(), "learn demo.csv -o reach.toml").success();
-    folder
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
+use crate::tool::{judged as tactus, learned, names};
 
 /// The only folder in `runs`.
 fn only(base: &Path) -> PathBuf {
@@ -39,7 +17,7 @@ const DEVICE: &str = "--device sil:world=simple --non-interactive";
 
 #[test]
 fn a_run_is_kept_with_primitive_recording_result_and_report_and_all_of_them_can_be_used() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     tactus(at, &format!("{DEVICE} run reach.toml --keep --dry-run")).success();
     assert!(!at.join("runs").exists(), "nothing moved, nothing is kept");
@@ -67,7 +45,7 @@ fn a_run_is_kept_with_primitive_recording_result_and_report_and_all_of_them_can_
 
 #[test]
 fn a_run_that_fails_is_kept_as_well_with_its_failure_and_what_was_recorded() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     let script = "[[scenario]]\nname = \"a stuck encoder\"\nfrom = \"run\"\n\
         inject = [{ at = 8.5, what.freeze = { kind = \"position\", from = [4] } }]\n";
@@ -89,7 +67,7 @@ fn a_run_that_fails_is_kept_as_well_with_its_failure_and_what_was_recorded() {
 /// The change that makes it fail: the folder is made behind the upload.
 #[test]
 fn a_folder_that_cannot_be_made_is_told_before_anything_is_sent() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     std::fs::write(at.join("runs"), "a file").unwrap();
     for (place, words) in [("", "making the folder runs: a file has that name"), (" /proc/runs", "/proc/runs")] {
@@ -104,7 +82,7 @@ fn a_folder_that_cannot_be_made_is_told_before_anything_is_sent() {
 /// The change that makes it fail: nobody calls `discard`.
 #[test]
 fn a_run_whose_primitive_the_device_does_not_take_leaves_no_folder() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     let device = "--device sil:world=simple,flash=arm.flash --non-interactive";
     tactus(at, "secret new lab.secret").success();
@@ -118,7 +96,7 @@ fn a_run_whose_primitive_the_device_does_not_take_leaves_no_folder() {
 /// The change that makes it fail: `hint` gives nothing, or does not look at what is a folder.
 #[test]
 fn a_primitive_that_an_option_has_taken_for_its_folder_is_told_with_the_line_to_type() {
-    let folder = learned();
+    let folder = learned(3.0);
     let at = folder.path();
     let told = |line: &str| {
         let refused = tactus(at, line).failure().code(2);

@@ -10,10 +10,11 @@ use control::RATE_HZ;
 use serde_json::Value;
 
 use crate::common;
+use crate::tool;
 
 fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("TACTUS_DEVICE", "unix:arm.sock").args(arguments).stdin(Stdio::null());
+    let mut command = tool::command(folder, arguments);
+    command.env("TACTUS_DEVICE", "unix:arm.sock");
     command
 }
 

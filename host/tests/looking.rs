@@ -1,28 +1,7 @@
 //! Commands that only tell: reports of runs, the meaning of codes, completions. None of them needs a device.
 
-use std::path::Path;
-
-use assert_cmd::Command;
-use assert_cmd::assert::Assert;
-
 use crate::common;
-
-fn tactus(folder: &Path, arguments: &[&str]) -> Assert {
-    Command::new(env!("CARGO_BIN_EXE_tactus"))
-        .current_dir(folder)
-        .env("XDG_CONFIG_HOME", folder)
-        .env_remove("TACTUS_DEVICE")
-        .args(arguments)
-        .assert()
-}
-
-fn stdout(assert: &Assert) -> String {
-    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
-}
-
-fn stderr(assert: &Assert) -> String {
-    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
-}
+use crate::tool::{judged as tactus, stderr, stdout};
 
 #[test]
 fn a_report_is_written_once_and_replaced_only_when_told_to() {

@@ -6,6 +6,8 @@ mod common;
 mod elf;
 #[path = "common/served_arm.rs"]
 mod served_arm;
+#[path = "common/tool.rs"]
+mod tool;
 
 mod advice;
 mod book;

@@ -3,10 +3,11 @@
 //! `TACTUS_MUTATIONS=2000` runs the full count.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use crate::common;
+use crate::tool::command;
 
 /// Damaged files that are tried unless the environment says otherwise.
 const FEW: u64 = 60;
@@ -68,14 +69,9 @@ fn damage(bytes: &[u8], numbers: &mut Numbers) -> Vec<u8> {
 /// A command with a damaged file, run to its end.
 fn run(folder: &Path, line: &str) -> (Option<i32>, String, Duration) {
     let begun = Instant::now();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command
-        .current_dir(folder)
-        .env("XDG_CONFIG_HOME", folder)
-        .env_remove("TACTUS_DEVICE")
-        .args(line.split_whitespace());
+    let mut command = command(folder, line);
     let said = std::fs::File::create(folder.join("said")).unwrap();
-    let mut child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(said).spawn().unwrap();
+    let mut child = command.stdout(Stdio::null()).stderr(said).spawn().unwrap();
     while begun.elapsed() < TIME_LIMIT {
         if let Some(status) = child.try_wait().unwrap() {
             return (status.code(), std::fs::read_to_string(folder.join("said")).unwrap_or_default(), begun.elapsed());

@@ -1,26 +1,11 @@
 //! "Ok" is true: a command that ends with 0 did what was asked, and one that did not says by how much.
 
-use std::path::Path;
-
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use serde_json::Value;
 
 use crate::common;
-
-fn tactus(folder: &Path, line: &str) -> Assert {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command
-        .current_dir(folder)
-        .env("XDG_CONFIG_HOME", folder)
-        .env_remove("TACTUS_DEVICE")
-        .args(line.split_whitespace())
-        .assert()
-}
-
-fn stderr(assert: &Assert) -> String {
-    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
-}
+use crate::tool::{judged as tactus, stderr};
 
 fn json(assert: &Assert) -> Value {
     serde_json::from_slice(&assert.get_output().stdout).unwrap()

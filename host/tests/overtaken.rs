@@ -2,33 +2,17 @@
 //! unasked.
 
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::common;
+use crate::tool::{heeding, learned, said, succeeds};
 
 const DEVICE: &str = "--device sil:world=simple --non-interactive";
 
-/// A shell that starts the tests in the background has them ignore Ctrl-C, and so would the command.
 fn command(folder: &Path, line: &str) -> Command {
-    let mut command = Command::new("env");
-    command.arg("--default-signal=INT").arg(env!("CARGO_BIN_EXE_tactus")).current_dir(folder);
-    command.env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE");
-    command.args(line.split_whitespace()).stdin(Stdio::null());
-    command
-}
-
-#[track_caller]
-fn succeeds(folder: &Path, line: &str) -> Output {
-    let output = command(folder, line).output().unwrap();
-    assert!(output.status.success(), "{line}: {}", said(&output));
-    output
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    heeding("INT", folder, line)
 }
 
 fn begun(folder: &Path, line: &str) -> Child {
@@ -44,13 +28,6 @@ fn grows(child: &mut Child, file: &Path, bytes: u64) {
         assert_eq!(child.try_wait().unwrap(), None, "it ended by itself");
         std::thread::sleep(Duration::from_millis(1));
     }
-}
-
-fn learned(duration: f64) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    common::demonstration(folder.path(), duration);
-    succeeds(folder.path(), "learn demo.csv --name reach -o reach.toml");
-    folder
 }
 
 /// The change that makes it fail: a trial is written when it is complete.

@@ -2,9 +2,11 @@
 //! what it advises.
 
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 
 use serde_json::Value;
+
+use crate::tool;
 
 /// An arm whose links, hand and friction are not the model's; never weighed.
 const ARM: &str = "sil:world=simple,arm=12";
@@ -15,9 +17,7 @@ const HOLDING: &str = "sil:world=simple,arm=12,held=0.5@0.02:-0.015:0.15";
 const MEASURE: [&str; 3] = ["calibrate", "payload", "--measure"];
 
 fn tactus(folder: &Path, device: &str, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).args(["--device", device, "--json", "-q"]).args(arguments);
-    command.stdin(Stdio::null()).output().unwrap()
+    tool::tactus(folder, &[&["--device", device, "--json", "-q"], arguments].concat())
 }
 
 #[track_caller]

@@ -5,14 +5,15 @@ use std::path::Path;
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 
+use crate::tool::{command, judge};
+
 /// A device whose flash is a file: it keeps its secret from one command to the next.
 const DEVICE: &str = "--device sil:world=simple,flash=arm.flash --non-interactive";
 
 fn tactus(folder: &Path, line: &str, secret: Option<&str>) -> Assert {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE");
-    command.env_remove("TACTUS_SECRET_FILE").envs(secret.map(|file| ("TACTUS_SECRET_FILE", file)));
-    command.args(line.split_whitespace()).assert()
+    let mut command = command(folder, line);
+    command.envs(secret.map(|file| ("TACTUS_SECRET_FILE", file)));
+    judge(command)
 }
 
 fn said(assert: &Assert) -> String {

@@ -1,14 +1,14 @@
 //! The settings that a device keeps of its arm are read, changed, written to a file, compared and restored, by name.
 
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 
 use serde_json::{Value, json};
 
+use crate::tool::command;
+
 fn tactus_at(device: &str, folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("TACTUS_DEVICE", device).args(arguments);
-    command.stdin(Stdio::null()).output().unwrap()
+    command(folder, arguments).env("TACTUS_DEVICE", device).output().unwrap()
 }
 
 /// A device that keeps what it is told in a file.

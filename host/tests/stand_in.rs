@@ -10,6 +10,8 @@ use lab::client::Client;
 use lab::transport::StreamTransport;
 use serde_json::Value;
 
+use crate::tool::command;
+
 struct StandIn {
     program: Child,
     pendant: ChildStdin,
@@ -43,9 +45,8 @@ impl Drop for StandIn {
 }
 
 fn tactus(folder: &Path, line: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("TACTUS_DEVICE", "unix:tactus.sock").args(["--json", "--non-interactive"]);
-    command.args(line.split(' ')).stdin(Stdio::null()).output().unwrap()
+    let line = format!("--json --non-interactive {line}");
+    command(folder, &line).env("TACTUS_DEVICE", "unix:tactus.sock").output().unwrap()
 }
 
 /// The device's control cycle.

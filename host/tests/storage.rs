@@ -1,19 +1,13 @@
 //! An image that a device's flash has lost is told by `tactus list` and `tactus status`, and an upload brings it back.
 
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
 
 use serde_json::{Value, json};
 
 use crate::common;
+use crate::tool::tactus;
 
 const DEVICE: &str = "--device sil:world=simple,flash=arm.flash --non-interactive";
-
-fn tactus(folder: &Path, line: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE").stdin(Stdio::null());
-    command.args(line.split_whitespace()).output().unwrap()
-}
 
 #[track_caller]
 fn words(folder: &Path, line: &str) -> String {

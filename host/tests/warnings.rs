@@ -3,52 +3,20 @@
 
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
 use crate::common;
+use crate::tool::{self, Ended, command, learned, said, tactus};
 
 const DEVICE: &str = "--device sil:world=simple";
 
-fn command(folder: &Path, line: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("XDG_CONFIG_HOME", folder).env_remove("TACTUS_DEVICE");
-    command.args(line.split_whitespace()).stdin(Stdio::null());
-    command
-}
-
-fn tactus(folder: &Path, line: &str) -> Output {
-    command(folder, line).output().unwrap()
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
+/// The words of a command that has to succeed.
 #[track_caller]
 fn succeeds(folder: &Path, line: &str) -> String {
-    let output = tactus(folder, line);
-    assert!(output.status.success(), "{line}: {}", said(&output));
-    said(&output)
-}
-
-fn learned(duration: f64) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    common::demonstration(folder.path(), duration);
-    succeeds(folder.path(), "learn demo.csv --name reach -o reach.toml");
-    folder
-}
-
-/// Ends a program with the test.
-struct Ended(Child);
-
-impl Drop for Ended {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
+    said(&tool::succeeds(folder, line))
 }
 
 /// The change that makes it fail: the end of the time is not told, or told to whoever gave a time.

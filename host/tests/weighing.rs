@@ -5,6 +5,8 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
+use crate::tool;
+
 /// An arm that was not looked at while the regression was made, in a device with a flash of its own.
 const DEVICE: &str = "sil:world=simple,arm=7,flash=arm.flash";
 
@@ -12,9 +14,8 @@ const DEVICE: &str = "sil:world=simple,arm=7,flash=arm.flash";
 const NOMINAL: &str = "sil:world=simple";
 
 fn tactus(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
-    command.current_dir(folder).env("TACTUS_DEVICE", DEVICE).args(["--json", "-q"]).args(arguments);
-    command.stdin(Stdio::null()).output().unwrap()
+    let arguments = [&["--json", "-q"], arguments].concat();
+    tool::command(folder, &arguments).env("TACTUS_DEVICE", DEVICE).output().unwrap()
 }
 
 #[track_caller]
