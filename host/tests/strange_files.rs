@@ -1,6 +1,11 @@
 //! Files that were made elsewhere, or for something else: what they are is told in a few words.
 
-use crate::tool::{learned, said, tactus};
+use std::io::read_to_string;
+use std::process::{Command, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+
+use crate::tool::{Ended, command, learned, said, tactus};
 
 /// The change that makes it fail: the parser shows the line that it stumbles over, however long that is.
 #[test]
@@ -25,6 +30,27 @@ fn a_file_that_is_no_toml_and_has_long_lines_does_not_fill_the_screen() {
     let output = tactus(at, "list");
     let said = said(&output);
     assert!(said.len() < 1000 && said.contains("config.toml"), "{}", said.chars().take(1000).collect::<String>());
+}
+
+/// A second reading waits for ever, or fills the memory with what `/dev/zero` gives.
+///
+/// The change that makes it fail: `rehearse` reads the file once more for what it compares with at its end.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_primitive_that_comes_through_a_pipe_is_read_once_and_rehearsed() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    let text = std::fs::read(at.join("reach.toml")).unwrap();
+    let pipe = at.join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let line = "--device sil:world=simple --non-interactive rehearse pipe --trials 1 -o rehearsed.toml";
+    let mut rehearsal = Ended(command(at, line).stderr(Stdio::piped()).spawn().unwrap());
+    let (sender, ended) = mpsc::channel();
+    let mut words = rehearsal.0.stderr.take().unwrap();
+    std::fs::write(&pipe, text).unwrap();
+    std::thread::spawn(move || sender.send(read_to_string(&mut words)));
+    let said = ended.recv_timeout(Duration::from_secs(60)).expect("it ends").unwrap();
+    assert!(rehearsal.0.wait().unwrap().success() && said.contains("wrote rehearsed.toml"), "{said}");
 }
 
 /// The change that makes it fail: a text is parsed as it stands in the file.

@@ -17,6 +17,7 @@ use crate::quoted;
 use lab::client::Client;
 use lab::demonstration::{Origin, RATE, Recording};
 use lab::device::Device;
+use lab::input_file;
 use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsals};
 use lab::output_file::OutputFile;
 use lab::primitive_file::{LARGEST_DURATION_DEVIATION, PrimitiveFile};
@@ -97,8 +98,7 @@ pub struct Report {
 /// The primitive is wrong, the device refuses, a run ends early, or what was recorded cannot be used.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
-    let before = std::fs::read(&command.primitive).ok();
-    let mut file = upload::read(&command.primitive, DOING)?;
+    let (mut file, before) = upload::read_with_text(&command.primitive, DOING)?;
     let movement = file.without_memory();
     keepable(&movement, command.speed)?;
     upload::precheck(&movement, &Course::stored(command.speed), output, DOING)?;
@@ -152,7 +152,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     )
     .inspect_err(|_| tell_unkept(command, output))
     .map_err(|cause| memory_failure(cause, "rehearse: no expectation was stored"))?;
-    let is_changed = target == command.primitive && std::fs::read(&target).ok() != before;
+    let is_changed = target == command.primitive && input_file::read_text(&target).ok() != Some(before);
     if is_changed {
         return Err(keep_beside(&file, output_file, &target)?);
     }

@@ -118,10 +118,15 @@ pub(super) fn say_replaced(old: &Listing, output: Output) {
 
 /// Reads a primitive that fits this arm.
 pub(super) fn read(path: &Path, doing: &str) -> Result<PrimitiveFile, Failure> {
+    read_with_text(path, doing).map(|(file, _)| file)
+}
+
+/// The same, with the text of the file.
+pub(super) fn read_with_text(path: &Path, doing: &str) -> Result<(PrimitiveFile, String), Failure> {
     let refused = |cause| super::check::failure(cause, path, doing);
-    let file = PrimitiveFile::read(path).map_err(refused)?;
+    let (file, text) = PrimitiveFile::read_with_text(path).map_err(refused)?;
     file.require_model(control::MODEL_HASH).map_err(refused)?;
-    Ok(file)
+    Ok((file, text))
 }
 
 /// Plays the primitive on the host first, and refuses what would break a limit of the arm.

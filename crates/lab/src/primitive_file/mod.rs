@@ -231,9 +231,17 @@ impl PrimitiveFile {
     /// # Errors
     /// The first thing that is wrong.
     pub fn read(file: &Path) -> Result<PrimitiveFile, PrimitiveFileError> {
+        PrimitiveFile::read_with_text(file).map(|(primitive, _)| primitive)
+    }
+
+    /// The same, with the text: of a pipe it cannot be read a second time.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn read_with_text(file: &Path) -> Result<(PrimitiveFile, String), PrimitiveFileError> {
         let text =
             input_file::read_text(file).map_err(|cause| PrimitiveFileError::Io { file: file.to_owned(), cause })?;
-        PrimitiveFile::parse(file, &text)
+        Ok((PrimitiveFile::parse(file, &text)?, text))
     }
 
     /// Checks text that was read from `file`.
