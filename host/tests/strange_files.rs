@@ -44,7 +44,7 @@ fn a_primitive_that_comes_through_a_pipe_is_read_once_and_rehearsed() {
     let pipe = at.join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let line = "--device sil:world=simple --non-interactive rehearse pipe --trials 1 -o rehearsed.toml";
-    let mut rehearsal = Ended(command(at, line).stderr(Stdio::piped()).spawn().unwrap());
+    let mut rehearsal = Ended(command(at, line).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap());
     let (sender, ended) = mpsc::channel();
     let mut words = rehearsal.0.stderr.take().unwrap();
     std::fs::write(&pipe, text).unwrap();

@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 use control::Fault;
 use device::Stage;
 use link::{HandStage, HomeSource, Refusal, Secret, SecretState, Status};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use super::{ErrorCode, Failure, Global, Output, interruption};
@@ -431,12 +430,12 @@ fn owner(simulated: bool) -> String {
     format!("{user}{at}{host} (process {})", std::process::id())
 }
 
-/// Raised by the first Ctrl-C, by a terminal that is closed, and by `kill`. A second one ends the process at once,
+/// Raised by the first signal that asks a program to end ([`interruption::ENDING`]). A second one ends the process at once,
 /// unless it is the same one, delivered twice: by the terminal and by the program that started this one.
 pub(super) fn interrupt() -> Interrupt {
     let interrupt = Interrupt::never();
     let flag = interrupt.flag();
-    match Signals::new([SIGINT, SIGTERM, SIGHUP]) {
+    match Signals::new(interruption::ENDING) {
         Ok(mut signals) => {
             interruption::leave_to_another();
             std::thread::spawn(move || {

@@ -3,16 +3,19 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use lab::unfinished;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level::emulate_default_handler;
 
 /// The command has an arm to stop, or a recording to keep: it has a way of its own to end.
 static IS_ANOTHERS: AtomicBool = AtomicBool::new(false);
 
+/// What asks a program to end: Ctrl-C, `kill`, a terminal that is closed, and Ctrl-\ of whoever does not wait for Ctrl-C.
+pub(super) const ENDING: [i32; 4] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT];
+
 /// From now on a signal ends the command as it would without this, but leaves no unfinished file behind.
 pub(super) fn clear_away() {
-    let heeded = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| !is_ignored(*signal));
+    let heeded = ENDING.into_iter().filter(|signal| !is_ignored(*signal));
     // Without it unfinished files stay: nothing else is lost.
     let Ok(mut signals) = Signals::new(heeded) else { return };
     std::thread::spawn(move || {
