@@ -81,6 +81,35 @@ fn a_run_that_was_played_tells_how_it_went_though_its_recording_has_no_place() {
     assert_eq!(std::fs::read_to_string(at.join("run.csv")).unwrap(), "mine");
 }
 
+/// The changes that make it fail: `Failure::kept` names any file; or `run` does not look whether its folder is there.
+#[test]
+fn what_has_gone_with_its_folder_is_not_said_to_be_kept() {
+    let folder = learned(20.0);
+    let at = folder.path();
+    for options in ["--record kept/run.csv", "--keep kept"] {
+        std::fs::create_dir(at.join("kept")).unwrap();
+        let mut run = begun(at, &format!("{DEVICE} --json run reach.toml {options}"));
+        let inside = || at.join("kept").read_dir().unwrap().next().map(|entry| entry.unwrap().path());
+        let waiting = Instant::now();
+        let found = loop {
+            assert!(waiting.elapsed() < Duration::from_secs(60), "nothing is written");
+            match inside() {
+                Some(found) => break found,
+                None => std::thread::yield_now(),
+            }
+        };
+        let part = if found.is_dir() { found.join("run.csv.part") } else { found };
+        grows(&mut run, &part, 50_000);
+        std::fs::remove_dir_all(at.join("kept")).unwrap();
+        let ended = run.wait_with_output().unwrap();
+        let told: Value = serde_json::from_slice(&ended.stdout).unwrap();
+        assert_eq!((told["error"]["code"].as_str(), ended.status.code()), (Some("E233"), Some(2)), "{told}");
+        assert!(told["error"].get("kept").is_none(), "{told}");
+        let words = said(&ended);
+        assert!(!words.contains("kept: ") && !words.contains("everything about this run"), "{words}");
+    }
+}
+
 /// The change that makes it fail: a rehearsal does not look at what is there.
 #[test]
 fn a_rehearsal_says_what_it_replaces_in_the_device_and_what_the_device_lacks_then() {

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 
-use crate::tool::{Ended, command, learned, said, tactus};
+use crate::tool::{Ended, command, learned, said, succeeds, tactus};
 
 /// The change that makes it fail: the parser shows the line that it stumbles over, however long that is.
 #[test]
@@ -62,4 +62,26 @@ fn a_primitive_whose_lines_end_in_carriage_returns_alone_is_checked() {
     std::fs::write(at.join("mac.toml"), text.replace('\n', "\r")).unwrap();
     let [usual, returns] = ["reach", "mac"].map(|name| tactus(at, &format!("check {name}.toml")).stdout);
     assert!(!usual.is_empty() && usual == returns);
+}
+
+/// The changes that make it fail: a failure, a result, or what is said besides shows a file's letters as they are.
+#[test]
+fn nothing_in_a_file_commands_the_terminal() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    succeeds(at, "--device sil:world=simple --non-interactive run reach.toml --record run.csv");
+    let text = std::fs::read_to_string(at.join("run.csv")).unwrap();
+    std::fs::write(at.join("state.csv"), text.replacen(",run,", ",\u{1b}[31mrun,", 1)).unwrap();
+    let named = "\u{1b}[31mred.csv";
+    std::fs::write(at.join(named), text).unwrap();
+    for (words, shown) in [
+        (["report", "state.csv", "-o", "a.html"], "`\\u{1b}[31mrun` is no state"),
+        (["report", named, "-o", "b.html"], "\\u{1b}[31mred.csv: arrived"),
+        (["export", named, "-o", "\u{9b}c.mcap"], "\\u{9b}c.mcap"),
+        (["learn", "demo.csv", "-o", "\u{7}.toml"], "\\u{7}"),
+    ] {
+        let output = tactus(at, &words);
+        let all = String::from_utf8_lossy(&output.stdout).into_owned() + &said(&output);
+        assert!(all.contains(shown) && !all.contains(|letter: char| letter.is_control() && letter != '\n'), "{all:?}");
+    }
 }

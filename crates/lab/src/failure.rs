@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error_code::ErrorCode;
+use crate::visible::visible;
 
 /// A failed command.
 #[derive(Debug)]
@@ -58,10 +59,11 @@ impl Failure {
         self
     }
 
-    /// The same with what was recorded before it.
+    /// The same with the file of what was recorded before it. One that has gone meanwhile, with its folder, is not
+    /// named.
     #[must_use]
     pub fn kept(mut self, file: impl Into<PathBuf>) -> Failure {
-        self.kept = Some(file.into());
+        self.kept = Some(file.into()).filter(|file| file.exists());
         self
     }
 
@@ -116,7 +118,7 @@ impl fmt::Display for Failure {
         if let Some(help) = &self.help {
             write!(text, "\n  help: {help}")?;
         }
-        formatter.write_str(&text)
+        formatter.write_str(&visible(&text))
     }
 }
 

@@ -34,4 +34,5 @@ pub mod table;
 pub mod tracking;
 pub mod transport;
 pub mod unfinished;
+pub mod visible;
 pub mod weigh;

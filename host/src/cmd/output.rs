@@ -7,6 +7,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, progress};
+use lab::visible::visible;
 
 /// The action that fails when standard output does.
 pub(super) const WRITING: &str = "writing the result to standard output";
@@ -38,13 +39,13 @@ impl Output {
     pub fn say(&self, words: impl AsRef<str>) {
         if !self.quiet {
             // A terminal that was closed is no reason to end: an arm may be moving.
-            let _ = writeln!(std::io::stderr(), "{}", words.as_ref());
+            let _ = writeln!(std::io::stderr(), "{}", visible(words.as_ref()));
         }
     }
 
     /// Warns, also when quiet.
     pub fn warn(&self, words: impl AsRef<str>) {
-        let _ = writeln!(std::io::stderr(), "warning: {}", words.as_ref());
+        let _ = writeln!(std::io::stderr(), "warning: {}", visible(words.as_ref()));
     }
 
     /// Writes the result: `data` as one line of JSON, or `text`.
@@ -66,7 +67,7 @@ impl Output {
                 .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, WRITING, cause))?
                 .into()
         } else {
-            text.as_ref().trim_end().into()
+            visible(text.as_ref().trim_end())
         };
         written(writeln!(std::io::stdout(), "{line}"))
     }

@@ -136,7 +136,10 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if let Some(folder) = folder {
         let kept = folder.finish(&mut ended, client.hello());
         let all = if kept.is_ok() { "everything" } else { "not everything" };
-        output.say(format!("{all} about this run is in {}", folder.path().display()));
+        // Somebody may have removed it meanwhile.
+        if folder.path().is_dir() {
+            output.say(format!("{all} about this run is in {}", folder.path().display()));
+        }
         let name = Some(files::text(folder.path()));
         ended = ended.and_then(|report| kept.map(|()| Report { folder: name, ..report }));
     }

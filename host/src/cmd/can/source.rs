@@ -10,6 +10,7 @@ use canlog::{LineError, LogLine};
 use lab::client::Interrupt;
 use lab::error::HostError;
 use lab::transport::SocketCan;
+use lab::visible::visible;
 
 /// Lines that are reported one by one; of more only the number.
 const REPORTED: u64 = 20;
@@ -59,7 +60,7 @@ impl Garbage {
         if self.lines <= REPORTED {
             let shown: String = text.trim_end().chars().take(SHOWN).collect();
             let rest = if shown.len() < text.trim_end().len() { "..." } else { "" };
-            eprintln!("line {number}: {error}: `{}{rest}`", shown.escape_debug());
+            eprintln!("line {number}: {}: `{}{rest}`", visible(&error.to_string()), shown.escape_debug());
         } else if self.lines == REPORTED + 1 {
             eprintln!("more such lines are only counted");
         }
