@@ -190,6 +190,20 @@ fn a_log_whose_lines_end_in_carriage_returns_is_read_and_its_lines_are_numbered(
     assert!(text.lines().count() > 2000, "{}", text.lines().count());
 }
 
+/// The change that makes it fail: a wrong line is told by what panics where nobody can be told.
+#[test]
+fn wrong_lines_of_which_nobody_can_be_told_are_no_crash() {
+    let (folder, _file) = log_file("(1.000000) can0 404#30\nhello\nworld\n");
+    let line =
+        "set -o pipefail; \"$0\" can decode bus.log 2>&1 >out | true; \"$0\" can decode bus.log 2>/dev/full >out";
+    for _ in 0..5 {
+        let mut shell = std::process::Command::new("bash");
+        shell.current_dir(folder.path()).args(["-c", line, env!("CARGO_BIN_EXE_tactus")]);
+        assert_eq!(shell.output().unwrap().status.code(), Some(6));
+        assert!(std::fs::read_to_string(folder.path().join("out")).unwrap().contains("GET P"));
+    }
+}
+
 #[test]
 fn json_is_one_object_a_line_and_the_summary_last() {
     let (folder, _file) = log_file("(1.000000) can0 404#30\n(1.000200) can0 423#801000\n");

@@ -451,7 +451,10 @@ fn ask(global: &Global, question: &str) -> bool {
     if global.non_interactive || !std::io::stdin().is_terminal() || !std::io::stderr().is_terminal() {
         return false;
     }
-    eprint!("{question} [y/N] ");
+    // Who cannot be asked does not agree.
+    if write!(std::io::stderr(), "{question} [y/N] ").is_err() {
+        return false;
+    }
     let mut answer = String::new();
     let read = std::io::stdin().read_line(&mut answer);
     read.is_ok() && matches!(answer.trim(), "y" | "Y" | "yes")

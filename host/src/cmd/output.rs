@@ -34,18 +34,23 @@ pub struct Output {
     pub quiet: bool,
 }
 
+/// Says something to a person in any case, on standard error.
+pub(super) fn tell(words: impl AsRef<str>) {
+    // A terminal that was closed is no reason to end: an arm may be moving.
+    let _ = writeln!(std::io::stderr(), "{}", visible(words.as_ref()));
+}
+
 impl Output {
     /// Says something to a person.
     pub fn say(&self, words: impl AsRef<str>) {
         if !self.quiet {
-            // A terminal that was closed is no reason to end: an arm may be moving.
-            let _ = writeln!(std::io::stderr(), "{}", visible(words.as_ref()));
+            tell(words);
         }
     }
 
     /// Warns, also when quiet.
     pub fn warn(&self, words: impl AsRef<str>) {
-        let _ = writeln!(std::io::stderr(), "warning: {}", visible(words.as_ref()));
+        tell(format!("warning: {}", words.as_ref()));
     }
 
     /// Writes the result: `data` as one line of JSON, or `text`.

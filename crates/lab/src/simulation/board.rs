@@ -4,7 +4,7 @@
 //! host line; bus, world and people stay on this side, as with QEMU. The end of its input is the power switch: it
 //! then writes bank 2 and its report.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write as _};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
@@ -174,7 +174,10 @@ impl Drop for EmulatedBoard {
         if !ended.is_some_and(|status| status.success()) {
             // Nobody is left to take an error, but a bank 2 or a report that was not written must not go unnoticed.
             let how = ended.map_or_else(|| "had to be killed".to_owned(), |status| format!("ended with {status}"));
-            eprintln!("warning: when it was switched off, the emulated board {how}; it said: {}", self.last_output());
+            // Nobody may be there any more to hear it.
+            let mut terminal = std::io::stderr();
+            let said = self.last_output();
+            let _ = writeln!(terminal, "warning: when it was switched off, the emulated board {how}; it said: {said}");
         }
     }
 }

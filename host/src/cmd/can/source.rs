@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
 
 use super::{ErrorCode, Failure};
+use crate::cmd::output::tell;
 use canlog::{LineError, LogLine};
 use lab::client::Interrupt;
 use lab::error::HostError;
 use lab::transport::SocketCan;
-use lab::visible::visible;
 
 /// Lines that are reported one by one; of more only the number.
 const REPORTED: u64 = 20;
@@ -60,9 +60,9 @@ impl Garbage {
         if self.lines <= REPORTED {
             let shown: String = text.trim_end().chars().take(SHOWN).collect();
             let rest = if shown.len() < text.trim_end().len() { "..." } else { "" };
-            eprintln!("line {number}: {}: `{}{rest}`", visible(&error.to_string()), shown.escape_debug());
+            tell(format!("line {number}: {error}: `{}{rest}`", shown.escape_debug()));
         } else if self.lines == REPORTED + 1 {
-            eprintln!("more such lines are only counted");
+            tell("more such lines are only counted");
         }
     }
 }
@@ -141,7 +141,7 @@ impl Source {
         if !is_shorter || reader.rewind().is_err() {
             return false;
         }
-        eprintln!("{} was begun anew", path.display());
+        tell(format!("{} was begun anew", path.display()));
         true
     }
 
