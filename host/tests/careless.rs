@@ -23,6 +23,25 @@ fn refused(folder: &Path, line: &str) -> (i32, String, String, String) {
     (exit, code, message, help)
 }
 
+/// The change that makes it fail: the help of the code is given, which names no command.
+#[test]
+fn a_wrong_command_line_is_answered_with_a_line_that_shows_what_its_command_takes() {
+    let folder = tempfile::tempdir().unwrap();
+    for (line, advice) in [
+        ("config set", "tactus config set --help"),
+        ("--timeout 1e9 list", "tactus list --help"),
+        ("--sped 1 check a.toml", "tactus check --help"),
+        ("hand", "tactus hand --help"),
+        ("nosuch", "tactus --help"),
+        ("--json", "tactus --help"),
+    ] {
+        let (exit, code, _, help) = refused(folder.path(), line);
+        assert_eq!((exit, code.as_str()), (2, "E200"));
+        assert!(help.contains(&format!("`{advice}`")), "{line}: {help}");
+        tool::succeeds(folder.path(), advice.trim_start_matches("tactus "));
+    }
+}
+
 #[test]
 fn a_script_is_told_what_is_wrong_with_a_command_line_as_a_person_is() {
     let folder = tempfile::tempdir().unwrap();

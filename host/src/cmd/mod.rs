@@ -421,7 +421,7 @@ pub fn usage(error: &clap::Error) -> ExitCode {
     let hint = swallowed::hint(error, &words);
     if error.use_stderr() && wants_json {
         let failure = Failure::new(ErrorCode::CommandLine, "tactus", reason(&error.render().to_string()));
-        let failure = hint.iter().cloned().fold(failure, Failure::help);
+        let failure = failure.help(hint.clone().unwrap_or_else(|| help_of(&words)));
         // Nobody may be there any more to read it.
         let _ = writeln!(std::io::stdout(), "{}", failure.to_json());
     }
@@ -435,6 +435,18 @@ pub fn usage(error: &clap::Error) -> ExitCode {
         return tell(&failure, wants_json);
     }
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
+}
+
+/// The help of the command that these words name.
+fn help_of(words: &[String]) -> String {
+    let (mut command, mut named) = (Cli::command(), String::new());
+    for word in words {
+        if let Some(inner) = command.find_subcommand(word) {
+            named = format!("{named} {}", inner.get_name());
+            command = inner.clone();
+        }
+    }
+    format!("`tactus{named} --help` shows what it takes")
 }
 
 /// The mistake in a command line, on one line: all that stands above the usage, or a word on a command that is
