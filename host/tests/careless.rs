@@ -91,6 +91,24 @@ fn a_file_where_a_folder_is_expected_is_named_and_the_primitive_stays_as_it_is()
     assert_eq!(std::fs::read(at.join("there")).unwrap(), b"precious");
 }
 
+/// Elsewhere it is standard output. The change that makes it fail: a folder, or the file of a secret, may have any name.
+#[test]
+fn no_folder_and_no_secret_gets_the_name_of_standard_output() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    for line in [
+        "manual -".to_owned(),
+        "secret new -".to_owned(),
+        format!("{DEVICE} run reach.toml --keep -"),
+        format!("{DEVICE} rehearse reach.toml --record-dir -"),
+    ] {
+        let (exit, code, message, _) = refused(at, &line);
+        assert!(exit == 2 && code == "E231" && message.contains("standard output"), "{line}: {code}: {message}");
+        assert!(!at.join("-").exists(), "{line}");
+    }
+    succeeds(at, "manual ./-");
+}
+
 #[test]
 fn an_image_that_is_not_there_is_a_wrong_command_line_and_the_reason_is_told() {
     let folder = tempfile::tempdir().unwrap();

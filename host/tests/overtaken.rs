@@ -138,4 +138,10 @@ fn an_advised_command_names_a_path_with_spaces_as_one_word() {
     std::fs::rename(at.join("demo.csv"), at.join("my demo.csv")).unwrap();
     let output = command(at, "check").arg("my demo.csv").output().unwrap();
     assert!(said(&output).contains("`tactus learn 'my demo.csv'`"), "{}", said(&output));
+    let output = command(at, "manual").arg("my pages").output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("`man 'my pages/tactus-run.1'`"), "{told}");
+    let output = command(at, "manual -- -p").output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("`man ./-p/tactus-run.1`"), "{told}");
 }

@@ -236,6 +236,17 @@ pub fn refuse(target: &Path, force: bool, inputs: &[&Path]) -> Result<(), Output
     may_write(target, force, inputs).map(|_| ())
 }
 
+/// Refuses the name `-`: elsewhere that is standard output. Whoever wants a file or a folder of that name says `./-`.
+///
+/// # Errors
+/// [`OutputError::NotAFile`]
+pub fn refuse_standard_output(target: &Path) -> Result<(), OutputError> {
+    match target.as_os_str() == "-" {
+        true => Err(OutputError::NotAFile { file: target.to_owned(), found: "standard output" }),
+        false => Ok(()),
+    }
+}
+
 /// The place of a file that may be written, and what is there.
 fn may_write(target: &Path, force: bool, inputs: &[&Path]) -> Result<(PathBuf, Option<Metadata>), OutputError> {
     let (place, before) = inspect(target)?;
@@ -251,10 +262,7 @@ fn may_write(target: &Path, force: bool, inputs: &[&Path]) -> Result<(PathBuf, O
 /// The place behind links, and what is there.
 fn inspect(target: &Path) -> Result<(PathBuf, Option<Metadata>), OutputError> {
     let refused = |found| Err(OutputError::NotAFile { file: target.to_owned(), found });
-    // Elsewhere that is standard output; whoever wants a file of that name says `./-`.
-    if target.as_os_str() == "-" {
-        return refused("standard output");
-    }
+    refuse_standard_output(target)?;
     match fs::metadata(target) {
         Ok(found) if found.is_file() => {
             let is_link = fs::symlink_metadata(target).is_ok_and(|found| found.is_symlink());

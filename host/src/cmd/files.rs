@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use lab::demonstration::{Origin, Played};
-use lab::output_file::{OutputError, OutputFile};
+use lab::output_file::{self, OutputError, OutputFile};
 use lab::primitive_file::PrimitiveFile;
 
 use super::{ErrorCode, Failure, Global, Output};
@@ -28,8 +28,9 @@ pub(super) fn create(path: &Path, global: &Global, inputs: &[&Path], doing: &str
 /// Makes a folder, and those above it.
 ///
 /// # Errors
-/// A file has its name, or the system refuses.
+/// A file has its name, standard output has it, or the system refuses.
 pub(super) fn create_folder(folder: &Path, doing: &str) -> Result<(), Failure> {
+    output_file::refuse_standard_output(folder).map_err(|error| failure(error, doing))?;
     std::fs::create_dir_all(folder).map_err(|cause| {
         let doing = format!("{doing}: making the folder {}", folder.display());
         match cause.kind() {

@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Cli, ErrorCode, Failure, Global, files};
+use crate::quoted;
 
 /// Options of `manual`.
 #[derive(Debug, Clone, Args)]
@@ -47,7 +48,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         files::fill(file, &text, doing)?;
         written.pages.push(files::text(&path));
     }
-    let words = format!("{} pages; for example `man {}/tactus-run.1`", written.pages.len(), command.folder.display());
+    let page = quoted::path(&command.folder.join("tactus-run.1"));
+    let words = format!("{} pages; for example `man {page}`", written.pages.len());
     global.output().result(&written, words)
 }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use lab::secret_file;
+use lab::{output_file, secret_file};
 use link::{SecretReport, SecretState};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -67,6 +67,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let failed = |error: HostError| error.into_failure(DOING);
     match &command.action {
         Action::New(FileOf { file }) => {
+            output_file::refuse_standard_output(file).map_err(|error| files::failure(error, DOING))?;
             secret_file::create(file).map_err(|error| connection::secret_failure(file, error, DOING))?;
             let data = Drawn { file: files::text(file) };
             let words = format!("{}: a new secret; keep a copy, a device that keeps it asks for it", data.file);
