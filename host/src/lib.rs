@@ -5,5 +5,4 @@ pub mod cmd;
 pub mod config;
 pub mod monitor;
 pub mod probe;
-mod quoted;
 pub mod schemas;

@@ -24,6 +24,7 @@ pub mod plan;
 pub mod plot;
 pub mod primitive_file;
 pub mod procedure;
+pub mod quoted;
 pub mod replay;
 pub mod report;
 pub mod secret_file;

@@ -7,7 +7,7 @@ use lab::procedure::{Change, ChangeKind};
 use link::Goal;
 
 use super::{CheckReport, Course, Limit, UNFIT};
-use crate::quoted;
+use lab::quoted;
 
 /// Slowest run, as a factor of the taught speed.
 const SLOWEST: f64 = 0.1;

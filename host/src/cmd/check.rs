@@ -6,9 +6,9 @@ use clap::Args;
 
 use super::{ErrorCode, Failure, Global};
 use crate::check::{self, Course};
-use crate::quoted;
 use lab::demonstration::Recording;
 use lab::primitive_file::{PrimitiveFile, PrimitiveFileError};
+use lab::quoted;
 use link::Goal;
 
 /// Options of `check`.

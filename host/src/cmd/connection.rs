@@ -11,12 +11,12 @@ use link::{HandStage, HomeSource, Refusal, Secret, SecretState, Status};
 use signal_hook::iterator::Signals;
 
 use super::{ErrorCode, Failure, Global, Output, interruption};
-use crate::quoted;
 use lab::client::{Client, Halted, Interrupt};
 use lab::device::{Device, OpenError};
 use lab::error::{HostError, explain_blocked};
 use lab::fault_guide::FaultGuide;
 use lab::procedure::{self, ProcedureError, Readiness, StartupLook};
+use lab::quoted;
 use lab::secret_file::{self, SecretFileError};
 use lab::simulation::{SimulationError, SimulationOptions};
 use lab::startup_guide::{blocked_remedy, stage_remedy};

@@ -8,11 +8,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, connection, files};
-use crate::quoted;
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::HostError;
 use lab::primitive_file::PrimitiveFile;
+use lab::quoted;
 
 /// Options of `get`.
 #[derive(Debug, Clone, Args)]

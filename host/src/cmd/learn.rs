@@ -8,12 +8,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, files};
-use crate::quoted;
 use lab::demonstration::{DemonstrationError, Preparation, Recording, RecordingError};
 use lab::learn::feedback::FeedbackOptions;
 use lab::learn::hand::HandMotion;
 use lab::learn::{self, LearnError, LearnOptions};
 use lab::primitive_file::OrientationError;
+use lab::quoted;
 
 /// Usual cut-off of the filter, Hz.
 const CUTOFF: f64 = 7.5;

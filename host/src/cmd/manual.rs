@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Cli, ErrorCode, Failure, Global, files};
-use crate::quoted;
+use lab::quoted;
 
 /// Options of `manual`.
 #[derive(Debug, Clone, Args)]

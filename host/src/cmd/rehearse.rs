@@ -13,7 +13,6 @@ use serde::Serialize;
 use super::files::{self, RecordingFile};
 use super::{ErrorCode, Failure, Global, Output, Table, connection, upload};
 use crate::check::Course;
-use crate::quoted;
 use lab::client::Client;
 use lab::demonstration::{Origin, RATE, Recording};
 use lab::device::Device;
@@ -22,6 +21,7 @@ use lab::learn::memory::{MemoryError, MemorySummary, Payload, remember_rehearsal
 use lab::output_file::OutputFile;
 use lab::primitive_file::{LARGEST_DURATION_DEVIATION, PrimitiveFile};
 use lab::procedure::{self, CHANNELS, FlagCounts, Mode, ProcedureError, recording_text};
+use lab::quoted;
 use lab::simulation::WorldKind;
 use lab::tracking::Tracking;
 

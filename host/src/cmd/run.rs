@@ -14,7 +14,6 @@ use super::run_folder::RunFolder;
 use super::run_report::{DryRun, Report, report};
 use super::{ErrorCode, Failure, Global, Output, connection, get, upload};
 use crate::check::Course;
-use crate::quoted;
 use lab::client::Client;
 use lab::demonstration::{Origin, RATE};
 use lab::device::Device;
@@ -24,6 +23,7 @@ use lab::primitive_file::PrimitiveFile;
 use lab::procedure::{
     self, Change, ChangeKind, FlagCounts, Mode, ProcedureError, RunOutcome, RunRequest, recording_text,
 };
+use lab::quoted;
 use lab::tracking::Missed;
 use lab::transport::{Address, SimulatorOptions};
 

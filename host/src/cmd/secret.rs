@@ -9,8 +9,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Failure, Global, connection, files};
-use crate::quoted;
 use lab::error::HostError;
+use lab::quoted;
 
 /// Options of `secret`.
 #[derive(Debug, Clone, Args)]

@@ -8,11 +8,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, Table, connection, files};
-use crate::quoted;
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::Capability;
 use lab::input_file;
+use lab::quoted;
 use lab::settings::{self, Change, Key, Setting, Settings, SettingsFile, WriteError};
 
 /// Actions on the settings that the device keeps.

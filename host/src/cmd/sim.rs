@@ -18,10 +18,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, Output, connection};
-use crate::quoted;
 use bus::BusServer;
 use lab::client::Interrupt;
 use lab::device::Device;
+use lab::quoted;
 use lab::simulation::Engine;
 use lab::transport::{Address, AddressError, Transport, TransportError};
 use party::{Party, Peer};

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::error::{ContextKind, ErrorKind};
 
-use crate::quoted;
+use lab::quoted;
 
 /// An option that may stand alone, and so takes the next word for its own.
 const OPTION: &str = "--keep";

@@ -1,5 +1,7 @@
 //! Why a text is no address of a device.
 
+use crate::quoted;
+
 /// Why a text is no address.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AddressError {
@@ -53,6 +55,19 @@ impl AddressError {
             _ if word.ends_with(".sock") => format!("unix:{word}"),
             _ => return None,
         };
-        Some(format!("`--device {meant}`"))
+        Some(format!("`--device {}`", quoted::text(&meant)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The change that makes it fail: the address goes into the line as it is.
+    #[test]
+    fn an_address_with_a_space_is_advised_as_one_word() {
+        let help = |text: &str| AddressError::Kind(text.to_owned()).help();
+        assert_eq!(help("my arm.sock").as_deref(), Some("`--device 'unix:my arm.sock'`"));
+        assert_eq!(help("/dev/ttyACM0").as_deref(), Some("`--device serial:/dev/ttyACM0`"));
     }
 }

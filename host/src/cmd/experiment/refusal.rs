@@ -9,7 +9,7 @@ use experiment::{Cell, Grid, Mode, Scenario};
 use sim::world::ObjectKind;
 
 use super::{Cmd, ErrorCode, Failure};
-use crate::quoted;
+use lab::quoted;
 
 /// The command, in front of what it failed with.
 pub(super) const DOING: &str = "experiment";

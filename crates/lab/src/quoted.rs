@@ -3,7 +3,8 @@
 use std::path::Path;
 
 /// A word as a shell takes it for one.
-pub(crate) fn text(word: &str) -> String {
+#[must_use]
+pub fn text(word: &str) -> String {
     let is_plain = |letter: char| letter.is_alphanumeric() || "-_./,=:+@%".contains(letter);
     if !word.is_empty() && word.chars().all(is_plain) {
         return word.to_owned();
@@ -12,7 +13,8 @@ pub(crate) fn text(word: &str) -> String {
 }
 
 /// A path as a shell takes it for one word.
-pub(crate) fn path(path: &Path) -> String {
+#[must_use]
+pub fn path(path: &Path) -> String {
     let word = path.to_string_lossy();
     // It would be taken for an option.
     let before = if word.starts_with('-') { "./" } else { "" };
