@@ -10,6 +10,7 @@ use clap::{ArgMatches, Command};
 use lab::error_code::ErrorCode;
 use lab::failure::Failure;
 use lab::input_file;
+use lab::quoted;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -81,7 +82,10 @@ impl Config {
         let text = match input_file::read_text(path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Self::default()),
-            Err(error) => return Err(failure(error.to_string())),
+            Err(error) => {
+                let help = format!("`ls -ld {}` shows what is there, and who may read it", quoted::path(path));
+                return Err(failure(error.to_string()).help(help));
+            }
         };
         let config: Self = toml::from_str(&text).map_err(|error| failure(input_file::parser_words(&error)))?;
         let texts = [("device", &config.device), ("secret_file", &config.secret_file)];

@@ -97,3 +97,15 @@ fn a_stop_takes_the_device_from_a_file_in_which_something_else_is_wrong() {
     let output = tactus(folder.path(), &[], "stop");
     assert!(output.status.code() == Some(2) && said(&output).contains("E250"), "{}", said(&output));
 }
+
+/// The change that makes it fail: the help names the settings, whatever is wrong with the file.
+#[test]
+fn a_configuration_file_that_cannot_be_read_is_answered_with_the_line_that_shows_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("tactus/config.toml");
+    std::fs::create_dir_all(&file).unwrap();
+    let output = tactus(folder.path(), &[], "list");
+    let words = said(&output);
+    assert!(output.status.code() == Some(2) && words.contains("error[E250]"), "{words}");
+    assert!(words.contains(&format!("help: `ls -ld {}`", lab::quoted::path(&file))), "{words}");
+}
