@@ -261,6 +261,6 @@ pub(super) fn recorded(text: &str) -> Result<f64, String> {
 pub(super) fn duration(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds <= 3600.0 => Ok(seconds),
-        _ => Err("a time above 0 s is expected, and at most 3600 s".to_owned()),
+        _ => Err("a time between 0 and 3600 s is expected, and more than 0".to_owned()),
     }
 }
