@@ -91,7 +91,9 @@ fn a_file_where_a_folder_is_expected_is_named_and_the_primitive_stays_as_it_is()
     assert_eq!(std::fs::read(at.join("there")).unwrap(), b"precious");
 }
 
-/// Elsewhere it is standard output. The change that makes it fail: a folder, or the file of a secret, may have any name.
+/// Elsewhere it is standard output.
+///
+/// The change that makes it fail: a folder, or the file of a secret, may have any name.
 #[test]
 fn no_folder_and_no_secret_gets_the_name_of_standard_output() {
     let folder = learned(3.0);

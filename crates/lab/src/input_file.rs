@@ -49,8 +49,8 @@ pub fn with_newlines(bytes: &[u8]) -> Cow<'_, [u8]> {
 /// Letters of the longest line of a file that is shown beside what is wrong with it.
 const SHOWN: usize = 160;
 
-/// What the parser of a text says, without the line that it shows where that is longer than people read: a picture or
-/// a page of HTML that was taken for a primitive has lines of a megabyte.
+/// The words of a parser, without the line that it shows where that is longer than people read: a picture or a page of
+/// HTML that was taken for a primitive has lines of a megabyte.
 #[must_use]
 pub fn parser_words(error: &impl Display) -> String {
     let words = error.to_string();

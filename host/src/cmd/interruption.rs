@@ -10,7 +10,8 @@ use signal_hook::low_level::emulate_default_handler;
 /// The command has an arm to stop, or a recording to keep: it has a way of its own to end.
 static IS_ANOTHERS: AtomicBool = AtomicBool::new(false);
 
-/// What asks a program to end: Ctrl-C, `kill`, a terminal that is closed, and Ctrl-\ of whoever does not wait for Ctrl-C.
+/// The signals that ask a program to end: Ctrl-C, `kill`, a terminal that is closed, and Ctrl-\ of whoever does not
+/// wait for Ctrl-C.
 pub(super) const ENDING: [i32; 4] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT];
 
 /// From now on a signal ends the command as it would without this, but leaves no unfinished file behind.

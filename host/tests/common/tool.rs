@@ -83,7 +83,7 @@ pub(crate) fn judge(command: Command) -> Assert {
     assert_cmd::Command::from_std(command).assert()
 }
 
-/// What it writes for people.
+/// The words that it writes for people.
 pub(crate) fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
@@ -93,7 +93,7 @@ pub(crate) fn stdout(assert: &Assert) -> String {
     String::from_utf8(assert.get_output().stdout.clone()).unwrap()
 }
 
-/// Its words, which are text.
+/// Its words, as text.
 pub(crate) fn stderr(assert: &Assert) -> String {
     String::from_utf8(assert.get_output().stderr.clone()).unwrap()
 }
@@ -106,7 +106,7 @@ pub(crate) fn succeeds(folder: &Path, line: &(impl Words + ?Sized)) -> Output {
     output
 }
 
-/// How a command has failed.
+/// The failure of a command.
 pub(crate) struct Refusal {
     /// Its exit code.
     pub(crate) exit: i32,
@@ -114,7 +114,7 @@ pub(crate) struct Refusal {
     pub(crate) code: String,
     /// Its words.
     pub(crate) message: String,
-    /// What helps; empty if nothing does.
+    /// The remedy; empty if there is none.
     pub(crate) help: String,
 }
 

@@ -44,7 +44,7 @@ pub(super) struct Garbage {
 }
 
 impl Garbage {
-    /// What is wrong with the log, if it has such lines.
+    /// The cause of a refusal, if the log has such lines.
     pub(super) fn cause(&self) -> Option<String> {
         let (first, lines) = (self.first?, self.lines);
         Some(match lines {
