@@ -42,6 +42,10 @@ const NEAR_LIMIT: f64 = 0.35;
 const DRAWN: f64 = 0.1;
 const RELAXED: f64 = 0.03;
 
+/// What a spring may be drawn by for friction alone, 1.3 times that of the model (rad): once the joint stands there,
+/// nothing but the integral brings it to its plan.
+const HELD: [f64; JOINTS] = [0.055, 0.055, 0.07, 0.055, 0.05, 0.055, 0.095];
+
 /// The tool pose in the position feedback `K_x (x_d - x)` of Eq (11).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PoseFeedback {
@@ -223,8 +227,8 @@ impl<R: Real> OperationalController<R> {
     }
 
     /// Lets go, from the next tick on, of the springs between joints and `q_d` that something has drawn and whose
-    /// joints come back faster than `planned`; true if there is one that is drawn. One joint in a tick is looked at:
-    /// nobody draws a spring faster.
+    /// joints come back faster than `planned`; true if there is one that more than friction draws. One joint in a tick
+    /// is looked at: nobody draws a spring faster.
     #[inline(never)]
     pub fn let_go(&mut self, state: &JointState<R>, planned: &JointVelocities<R>, clamp: &Vector7<R>) -> bool {
         let joint = usize::from(self.turn) % JOINTS;
@@ -233,20 +237,17 @@ impl<R: Real> OperationalController<R> {
         if offset * offset > R::constant(DRAWN * DRAWN) {
             self.drawn |= 1 << joint;
         }
-        let drawn = self.drawn != 0;
-        if drawn {
-            self.release(state, &(state.dq.0 - planned.0), clamp);
-        }
-        drawn
+        self.drawn != 0 && self.release(state, &(state.dq.0 - planned.0), clamp)
     }
 
     /// The same for every spring that is drawn; `speeds` are those beyond the plan.
     #[inline(never)]
-    fn release(&mut self, state: &JointState<R>, speeds: &Vector7<R>, clamp: &Vector7<R>) {
+    fn release(&mut self, state: &JointState<R>, speeds: &Vector7<R>, clamp: &Vector7<R>) -> bool {
         let joints = self.q_d.0.iter_mut().zip(state.q.0.iter()).zip(speeds.iter());
-        let mut bit = 1;
-        for ((((desired, q), speed), clamp), let_go) in joints.zip(clamp.iter()).zip(LET_GO) {
+        let (mut bit, mut is_drawn) = (1, false);
+        for (((((desired, q), speed), clamp), let_go), held) in joints.zip(clamp.iter()).zip(LET_GO).zip(HELD) {
             let (offset, near) = (*desired - *q, R::constant(RELAXED));
+            is_drawn |= self.drawn & bit != 0 && offset * offset > R::constant(held * held);
             if offset < near && offset > -near {
                 self.drawn &= !bit;
             } else if self.drawn & bit != 0
@@ -256,6 +257,7 @@ impl<R: Real> OperationalController<R> {
             }
             bit <<= 1;
         }
+        is_drawn
     }
 }
 
