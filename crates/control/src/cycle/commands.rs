@@ -87,6 +87,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             }
             Command::Hold => {
                 self.may_begin(measured)?;
+                if let (State::Approach, Law::Posture(posture)) = (self.supervisor.law(), &mut self.law) {
+                    posture.stay(q);
+                }
                 self.arm(Trigger::Hold, measured)
             }
             Command::Approach { q: target, duration } => {

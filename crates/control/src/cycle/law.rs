@@ -134,6 +134,13 @@ impl<R: Real> Posture<R> {
         (!self.gives_way).then_some(&self.q)
     }
 
+    /// Holds the arm where it is (rad), if it was held up: it goes on no more to where the plan of its approach is.
+    pub(super) fn stay(&mut self, q: &JointPositions<R>) {
+        if self.gives_way {
+            self.shift_to(*q);
+        }
+    }
+
     /// Takes another posture to hold (rad).
     pub(super) fn shift_to(&mut self, q: JointPositions<R>) {
         (self.q, self.held, self.gives_way) = (q, q, false);
