@@ -204,7 +204,7 @@ fn what_was_followed_in_a_run_counts_for_the_next_tare_as_the_tare_before_it_doe
         take(&mut estimator, Some(along_x(f64::min(0.2 * f64::from(tick) / RATE, 0.8))), false);
         let measured = estimator.wrench(&here);
         let deviation = Deviation::new(&[0.0; 9], &measured, None);
-        estimator.follow(&mut drift, &measured, Some(&deviation), &here);
+        estimator.follow(&mut drift, &measured, (Some(&deviation), false), &here);
     }
     assert!(estimator.raw_force() < 0.05, "{}", estimator.raw_force());
     for _ in 0..2 * half() {
@@ -304,7 +304,7 @@ fn what_is_expected_is_no_error_of_the_sensor_and_what_is_not_is_one() {
             take(&mut estimator, Some(sensed(&here, force, torque)), false);
             let measured = estimator.wrench(&here);
             let deviation = expected.map(|expected| Deviation::new(&expected, &measured, None));
-            estimator.follow(&mut drift, &measured, deviation.as_ref(), &here);
+            estimator.follow(&mut drift, &measured, (deviation.as_ref(), false), &here);
         }
         let left = estimator.wrench(&here);
         let (force, in_tool) = if is_followed { (Vector3::zeros(), Vector3::zeros()) } else { (force, in_tool) };
@@ -325,7 +325,7 @@ fn an_error_of_the_force_alone_is_followed_as_such_and_takes_no_torque_along() {
         // A force at the sensor and nothing else.
         let torque = here.tool_to_world().transpose() * here.tool_to_sensor().cross(&measured.force);
         assert!((measured.torque - torque).norm() < 1e-9, "{measured:?} {torque}");
-        estimator.follow(&mut drift, &measured, Some(&Deviation::new(&[0.0; 9], &measured, None)), &here);
+        estimator.follow(&mut drift, &measured, (Some(&Deviation::new(&[0.0; 9], &measured, None)), false), &here);
     }
     assert!(estimator.raw_force() < 0.02, "{}", estimator.raw_force());
 }

@@ -261,7 +261,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             return self.float(measured);
         };
         if senses == Senses::Fresh {
-            self.wrench.follow(drift, &measured.wrench, run.deviation(), measured.frames);
+            self.wrench.follow(drift, &measured.wrench, (run.deviation(), run.has_ended()), measured.frames);
             if let Some(surprise) = run.watch(primitive, &measured.wrench, hand) {
                 self.pending = Some(Event::Surprised { phase: surprise.progress, channel: surprise.channel });
             }

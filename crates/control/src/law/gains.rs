@@ -7,7 +7,7 @@
 use crate::model::wam7;
 use crate::real::Real;
 use crate::time::{PERIOD, periods};
-use crate::units::Vector7;
+use crate::units::{JOINTS, Vector7};
 
 /// Numbers of one way to track, before they are turned into the number type of the control code.
 struct Numbers {
@@ -59,6 +59,18 @@ const COMPLIANT: Numbers = Numbers {
 
 /// Gain of Eq (12) at rest in a compliant run, `P + K_i Dt`.
 pub(crate) const FORCE_AT_REST: f64 = COMPLIANT.force.0 + COMPLIANT.force.1 * COMPLIANT.force_window as f64 * PERIOD;
+
+/// What the spring of a compliant run is drawn by for friction alone, 1.5 times that of the model (rad): once a joint
+/// stands there, nothing but the integral brings it to its plan.
+pub(crate) const HELD_BY_FRICTION: [f64; JOINTS] = {
+    let mut held = wam7::FRICTION_COULOMB;
+    let mut joint = 0;
+    while joint < JOINTS {
+        held[joint] *= 1.5 / COMPLIANT.stiffness[joint];
+        joint += 1;
+    }
+    held
+};
 
 /// Fraction of the model's Coulomb friction that is fed forward. Below 1, so that too large an estimate never drives.
 const FRICTION_FRACTION: f64 = 0.8;

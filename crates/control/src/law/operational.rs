@@ -12,7 +12,7 @@
 use nalgebra::Vector3;
 
 use crate::command::AccelerationSource;
-use crate::law::gains::Tracking;
+use crate::law::gains::{HELD_BY_FRICTION, Tracking};
 use crate::law::spring::{self, LET_GO};
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
@@ -41,10 +41,6 @@ const NEAR_LIMIT: f64 = 0.35;
 /// which it no longer is.
 const DRAWN: f64 = 0.1;
 const RELAXED: f64 = 0.03;
-
-/// What a spring may be drawn by for friction alone, 1.3 times that of the model (rad): once the joint stands there,
-/// nothing but the integral brings it to its plan.
-const HELD: [f64; JOINTS] = [0.055, 0.055, 0.07, 0.055, 0.05, 0.055, 0.095];
 
 /// The tool pose in the position feedback `K_x (x_d - x)` of Eq (11).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -245,7 +241,9 @@ impl<R: Real> OperationalController<R> {
     fn release(&mut self, state: &JointState<R>, speeds: &Vector7<R>, clamp: &Vector7<R>) -> bool {
         let joints = self.q_d.0.iter_mut().zip(state.q.0.iter()).zip(speeds.iter());
         let (mut bit, mut is_drawn) = (1, false);
-        for (((((desired, q), speed), clamp), let_go), held) in joints.zip(clamp.iter()).zip(LET_GO).zip(HELD) {
+        for (((((desired, q), speed), clamp), let_go), held) in
+            joints.zip(clamp.iter()).zip(LET_GO).zip(HELD_BY_FRICTION)
+        {
             let (offset, near) = (*desired - *q, R::constant(RELAXED));
             is_drawn |= self.drawn & bit != 0 && offset * offset > R::constant(held * held);
             if offset < near && offset > -near {

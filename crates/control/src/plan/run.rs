@@ -393,6 +393,11 @@ impl<R: Real, const N: usize> Run<R, N> {
         self.rested >= SETTLING || is_overdue
     }
 
+    /// True once the movement has ended, though not yet the run.
+    pub(crate) fn has_ended(&self) -> bool {
+        self.ended > 0
+    }
+
     /// True as long as an arm that is still on its way to its goal is waited for.
     pub(crate) fn waits(&self) -> bool {
         self.ended < ARRIVING

@@ -3,7 +3,8 @@
 //! A sensor that is wrong by more than the dead band bends the plan as a contact does. In free motion what is measured
 //! beyond the expectation is such an error, and it changes slowly; a contact comes within a tenth of a second. So what
 //! deviates little, and came slowly, is taken for an error of the sensor and goes into the tare. From the moment on
-//! that it deviates by more, or changes fast, nothing is followed until it has been small again for a while.
+//! that it deviates by more, or changes fast, nothing is followed until it has been small again for a while; or until
+//! the movement has ended, because a sensor that is a little off is never that small again.
 
 use crate::real::{Real, sqrt, within};
 use crate::time::{PERIOD, periods};
@@ -75,15 +76,17 @@ impl<R: Real> Drift<R> {
         self.touched
     }
 
-    /// Takes the deviation of this control period (N, N m, sensor axes), and with it whether something is touched.
-    pub fn feel(&mut self, deviation: &Vector6<R>) {
+    /// Takes the deviation of this control period (N, N m, sensor axes), and with it whether something is touched. Once
+    /// the movement `has_ended`, what is left of a touch is an error of the sensor, as far as one goes.
+    pub fn feel(&mut self, deviation: &Vector6<R>, has_ended: bool) {
         // What deviates when the run begins has not come fast.
         let mean = self.mean.get_or_insert(*deviation);
         let change = deviation - *mean;
         *mean += change * R::constant(PERIOD / TOUCH);
         let touches = !is_within(&change, TOUCH_FORCE, TOUCH_TORQUE);
         self.touched |= touches && self.settling == 0;
-        let (force, torque) = if self.touched { (GONE_FORCE, GONE_TORQUE) } else { (FREE_FORCE, FREE_TORQUE) };
+        let is_left = self.touched && !has_ended;
+        let (force, torque) = if is_left { (GONE_FORCE, GONE_TORQUE) } else { (FREE_FORCE, FREE_TORQUE) };
         let free = !touches && is_within(deviation, force, torque);
         self.quiet = if free { self.quiet.saturating_add(1) } else { 0 };
         if self.is_free() {
@@ -132,7 +135,7 @@ mod tests {
             deviation = error(f64::from(tick) * PERIOD) - tare;
             worst = f64::max(worst, f64::abs(deviation));
             let sample = Vector6::new(deviation, 0.0, 0.0, 0.0, 0.0, 0.0);
-            drift.feel(&sample);
+            drift.feel(&sample, false);
             tare += if drift.is_free() { drift.follow(&sample)[0] } else { 0.0 };
         }
         (deviation, worst)
@@ -192,7 +195,7 @@ mod tests {
         let mut drift = Drift::<f64>::new();
         let sample = Vector6::from(deviation);
         (1..=2 * QUIET).find(|_| {
-            drift.feel(&sample);
+            drift.feel(&sample, false);
             drift.is_free() && drift.follow(&sample) != Vector6::zeros()
         })
     }

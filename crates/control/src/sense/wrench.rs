@@ -276,7 +276,7 @@ impl<R: Real> WrenchEstimator<R> {
         &mut self,
         drift: &mut Drift<R>,
         measured: &Wrench<R>,
-        deviation: Option<&Deviation<R>>,
+        (deviation, has_ended): (Option<&Deviation<R>>, bool),
         frames: &Frames<R>,
     ) {
         let nothing = Wrench::zero();
@@ -287,7 +287,7 @@ impl<R: Real> WrenchEstimator<R> {
             frames.tool_to_world() * (measured.torque - expected.torque) - frames.tool_to_sensor().cross(&force);
         let (force, torque) = (to_world.tr_mul(&force), to_world.tr_mul(&torque));
         let change = Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
-        drift.feel(&change);
+        drift.feel(&change, has_ended);
         if deviation.is_some() && drift.is_free() {
             self.tare += drift.follow(&change);
         }
@@ -339,7 +339,7 @@ mod tests {
         estimator.update(Some(raw), Some(&Vector6::zeros()), false);
         let measured = estimator.wrench(frames);
         let deviation = Deviation::new(&[0.0; 9], &measured, None);
-        estimator.follow(drift, &measured, Some(&deviation), frames);
+        estimator.follow(drift, &measured, (Some(&deviation), false), frames);
         measured
     }
 
@@ -376,7 +376,7 @@ mod tests {
         let here = frames([-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75]);
         for _ in 0..900 {
             estimator.update(Some(&sample([0.3, 0.0, 0.0], [0.0; 3])), Some(&Vector6::zeros()), false);
-            estimator.follow(&mut drift, &estimator.wrench(&here), None, &here);
+            estimator.follow(&mut drift, &estimator.wrench(&here), (None, false), &here);
         }
         assert!(drift.is_free() && (estimator.wrench(&here).force.norm() - 0.3).abs() < 0.01);
     }

@@ -1,5 +1,6 @@
 //! A compliant run that touches nothing ends once it has come to its goal, with an expectation and without.
 
+use control::plan::primitive::ExpectedWrench;
 use control::units::Orientation;
 use control::{Command, Fault, RATE, RunOptions, State};
 use nalgebra::Vector3;
@@ -139,6 +140,89 @@ fn a_run_that_was_shoved_on_its_way_or_is_run_again_ends_at_its_goal() {
             rig.command(Command::Approach { q: START.map(|q| q as f32), duration: 3.0 });
             rig.until(State::Hold, 20.0);
             rig.run_for(1.0);
+        }
+    }
+}
+
+/// A sensor that drifts by 0.05 N/s, and a touch of 1 N for 0.2 s halfway: at the end its error is 0.35 N, more than the
+/// 0.1 N below which what was touched is gone, so that it was touched for ever. The run neither settled nor waited and
+/// ended 19 to 36 mm beside its plan, 4 mm without the touch. A hand that weighs 20 g more than its model did the same.
+/// With an expectation and no drift a shove of 20 N leaves the tare off by as much: 14 to 71 mm.
+///
+/// The change that makes it fail: what is left of a touch is one once the movement has ended.
+#[test]
+fn a_run_of_a_sensor_that_is_a_little_off_ends_at_its_goal_after_a_touch_as_well() {
+    let [none, zero, _] = kinds();
+    for friction in [0.3, 1.0, 1.3] {
+        for ((what, expected, options), drift, push, within) in [(none, 0.05, 1.0, 0.1), (zero, 0.0, -20.0, 0.15)] {
+            let touched = end((5.0, friction), expected, options, |rig| {
+                rig.plant.glitch = drift * (rig.number as f64 / RATE - 2.0);
+                let axis = if push > 0.0 { 1 } else { 2 };
+                rig.plant.push[axis] = if is_halfway(rig, 5.0, within) { push } else { 0.0 };
+            });
+            let case = format!("{what}, friction x{friction}, {push} N: {touched:.4?}");
+            println!("{case}");
+            assert!(touched.distance < 8e-3, "{case}");
+        }
+    }
+}
+
+/// What a compliant run without an expectation measures on this arm, by its progress: a rehearsal.
+fn rehearsed(duration: f64, friction: f64) -> ExpectedWrench<f32> {
+    let mut rig = rig(friction);
+    rig.load(&primitive(&Design { duration, ..Design::default() })).expect("loads");
+    rig.command(Command::Run(kinds()[0].2));
+    let cycles = (duration * RATE).round() as usize;
+    let wrenches: Vec<_> = (0..=cycles).map(|_| rig.tick(None).record.wrench).collect();
+    let rows: Vec<[f32; 9]> = (0..=50)
+        .map(|row| {
+            let [fx, fy, fz, nx, ny, nz] = wrenches[row * cycles / 50];
+            [fx, fy, fz, nx, ny, nz, 0.0, 0.0, 0.0]
+        })
+        .collect();
+    ExpectedWrench::new(&rows, duration as f32).expect("an expectation")
+}
+
+/// An arm with so much friction at the start of a movement that expects what its rehearsal has measured.
+fn after_rehearsal(duration: f64, friction: f64) -> Rig<f32> {
+    let design = Design { duration, expected: Some([0.0; 6]), ..Design::default() };
+    let mut primitive = primitive(&design);
+    primitive.set_expected(Some(&rehearsed(duration, friction)));
+    let mut rig = rig(friction);
+    rig.load(&primitive).expect("loads");
+    rig
+}
+
+/// The rehearsal of 1.5 s measures up to 3.0 N, the inertia of the hand. The run that adapts to it was stopped 0.31 to
+/// 0.43 s after it began, `UnseenContact`, its hand at 0.71 to 0.94 m/s instead of 0.49 to 0.64: what deviates is
+/// inertia as well, and a plan that is braked by it makes more of it. Without friction it ends beside its plan still.
+///
+/// The change that makes it fail: a fast plan is braked as a slow one is.
+#[test]
+fn a_short_run_that_adapts_to_its_rehearsal_and_touches_nothing_ends_at_its_goal() {
+    for duration in [2.5, 1.8, 1.5, 1.3, 1.2] {
+        for friction in [0.3, 1.0, 1.3] {
+            let end = run_to_its_end(&mut after_rehearsal(duration, friction), adapting(), |_| {});
+            let case = format!("{duration} s, friction x{friction}: {end:.4?}");
+            println!("{case}");
+            assert!(end.distance < 8e-3, "{case}");
+        }
+    }
+}
+
+/// A run at half the speed of its rehearsal feels up to 0.8 N that it does not expect, its own inertia, which counts as
+/// a touch; at the end 0.15 to 0.26 N of tare and expectation are left, so that it was touched for ever: 17 to 51 mm.
+///
+/// The change that makes it fail: what is left of a touch is one once the movement has ended.
+#[test]
+fn a_run_at_half_the_speed_of_its_rehearsal_ends_at_its_goal() {
+    for friction in [0.3, 1.0, 1.3] {
+        for (what, _, options) in &kinds()[1..] {
+            let options = RunOptions { speed: 0.5, ..*options };
+            let end = run_to_its_end(&mut after_rehearsal(3.0, friction), options, |_| {});
+            let case = format!("{what}, at half speed, friction x{friction}: {end:.4?}");
+            println!("{case}");
+            assert!(end.distance < 8e-3, "{case}");
         }
     }
 }
