@@ -63,6 +63,16 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if (wrench || self.is_bare()) && self.hand.tare() | wrench { Ok(()) } else { Err(Refusal::WrenchMissing) }
     }
 
+    /// Holds the arm. One that was held up in an approach stays where it is: the plan has gone on without it.
+    fn hold(&mut self, measured: &Measured<'_, R>) -> Result<(), Refusal> {
+        self.may_begin(measured)?;
+        self.supervisor.allows(Trigger::Hold)?;
+        if let (State::Approach, Law::Posture(posture)) = (self.supervisor.law(), &mut self.law) {
+            posture.stay(&measured.state.q);
+        }
+        self.arm(Trigger::Hold, measured)
+    }
+
     #[inline(never)]
     pub(super) fn command(&mut self, command: Command, measured: &Measured<'_, R>) -> Result<(), Refusal> {
         let q = &measured.state.q;
@@ -85,13 +95,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 self.may_begin(measured)?;
                 self.arm(Trigger::Gravity, measured)
             }
-            Command::Hold => {
-                self.may_begin(measured)?;
-                if let (State::Approach, Law::Posture(posture)) = (self.supervisor.law(), &mut self.law) {
-                    posture.stay(q);
-                }
-                self.arm(Trigger::Hold, measured)
-            }
+            Command::Hold => self.hold(measured),
             Command::Approach { q: target, duration } => {
                 self.may_begin(measured)?;
                 self.supervisor.allows(Trigger::Approach)?;

@@ -60,8 +60,8 @@ const COMPLIANT: Numbers = Numbers {
 /// Gain of Eq (12) at rest in a compliant run, `P + K_i Dt`.
 pub(crate) const FORCE_AT_REST: f64 = COMPLIANT.force.0 + COMPLIANT.force.1 * COMPLIANT.force_window as f64 * PERIOD;
 
-/// What the spring of a compliant run is drawn by for friction alone, 1.5 times that of the model (rad): once a joint
-/// stands there, nothing but the integral brings it to its plan.
+/// Distance by which friction alone, 1.5 times that of the model, draws the spring of a compliant run (rad): once a
+/// joint stands there, nothing but the integral brings it to its plan.
 pub(crate) const HELD_BY_FRICTION: [f64; JOINTS] = {
     let mut held = wam7::FRICTION_COULOMB;
     let mut joint = 0;

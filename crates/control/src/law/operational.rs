@@ -233,10 +233,14 @@ impl<R: Real> OperationalController<R> {
         if offset * offset > R::constant(DRAWN * DRAWN) {
             self.drawn |= 1 << joint;
         }
-        self.drawn != 0 && self.release(state, &(state.dq.0 - planned.0), clamp)
+        if self.drawn == 0 {
+            return false;
+        }
+        self.release(state, &(state.dq.0 - planned.0), clamp)
     }
 
-    /// The same for every spring that is drawn; `speeds` are those beyond the plan.
+    /// The same for every spring that is drawn; `speeds` are those beyond the plan. True if more than friction draws
+    /// one.
     #[inline(never)]
     fn release(&mut self, state: &JointState<R>, speeds: &Vector7<R>, clamp: &Vector7<R>) -> bool {
         let joints = self.q_d.0.iter_mut().zip(state.q.0.iter()).zip(speeds.iter());

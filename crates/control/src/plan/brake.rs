@@ -17,8 +17,8 @@ const SENSITIVITY: f64 = 45.0;
 /// a plan that is braked by that as well drives the cable of J1.
 const LIGHT: f64 = 0.25;
 
-/// The same of a movement of one second (N), for what an arm beside its plan measures of its own hand: it grows with the
-/// square of the rate. Braked by that, a plan makes more of it.
+/// The same of a movement of one second (N), for what an arm beside its plan measures of its own hand: it grows with
+/// the square of the rate. Braked by that, a plan makes more of it.
 const INERTIA: f64 = 3.0;
 
 /// Largest share (1/s), half in a control period.

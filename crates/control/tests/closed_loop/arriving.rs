@@ -112,10 +112,10 @@ fn a_run_does_not_wait_for_an_arm_that_touches_something() {
     }
 }
 
-/// A shove of 20 N downwards turns the wrist by more than 0.1 rad, and a fast run with 1.3 times the friction does so by
-/// itself. Friction then held a spring 0.065 to 0.085 rad drawn, which counted as one that somebody draws until the run
-/// was over: the integral of every joint faded, nobody waited, and the hand ended 54 to 74 mm beside its plan. Of runs
-/// in a row every second one did so.
+/// A shove of 20 N downwards turns the wrist by more than 0.1 rad, and a fast run with 1.3 times the friction does so
+/// by itself. Friction then held a spring 0.065 to 0.085 rad drawn, which counted as one that somebody draws until the
+/// run was over: the integral of every joint faded, nobody waited, and the hand ended 54 to 74 mm beside its plan. Of
+/// runs in a row every second one did so.
 ///
 /// The change that makes it fail: what friction alone draws is drawn.
 #[test]
@@ -144,10 +144,10 @@ fn a_run_that_was_shoved_on_its_way_or_is_run_again_ends_at_its_goal() {
     }
 }
 
-/// A sensor that drifts by 0.05 N/s, and a touch of 1 N for 0.2 s halfway: at the end its error is 0.35 N, more than the
-/// 0.1 N below which what was touched is gone, so that it was touched for ever. The run neither settled nor waited and
-/// ended 19 to 36 mm beside its plan, 4 mm without the touch. A hand that weighs 20 g more than its model did the same.
-/// With an expectation and no drift a shove of 20 N leaves the tare off by as much: 14 to 71 mm.
+/// A sensor that drifts by 0.05 N/s, and a touch of 1 N for 0.2 s halfway: at the end its error is 0.35 N, more than
+/// the 0.1 N below which what was touched is gone, so that it was touched for ever. The run neither settled nor waited
+/// and ended 19 to 36 mm beside its plan, 4 mm without the touch. A hand that weighs 20 g more than its model did the
+/// same. With an expectation and no drift a shove of 20 N leaves the tare off by as much: 14 to 71 mm.
 ///
 /// The change that makes it fail: what is left of a touch is one once the movement has ended.
 #[test]
@@ -167,7 +167,7 @@ fn a_run_of_a_sensor_that_is_a_little_off_ends_at_its_goal_after_a_touch_as_well
     }
 }
 
-/// What a compliant run without an expectation measures on this arm, by its progress: a rehearsal.
+/// A rehearsal: the wrench of a compliant run without an expectation on this arm, by its progress.
 fn rehearsed(duration: f64, friction: f64) -> ExpectedWrench<f32> {
     let mut rig = rig(friction);
     rig.load(&primitive(&Design { duration, ..Design::default() })).expect("loads");

@@ -250,8 +250,8 @@ fn g1_an_arm_that_is_held_up_in_an_approach_is_not_thrown_when_it_is_let_go_of()
     assert!(worst.0 < 1.15 && worst.1 < 1.0, "{worst:?} m/s");
 }
 
-/// Who holds the hand of an approach and has the arm told to hold it there was taken along by 20 to 37 cm once it was let
-/// go of, at up to 0.64 m/s: the posture to hold was that of the plan, which had gone on.
+/// Who holds the hand of an approach and has the arm told to hold it there was taken along by 20 to 37 cm once it was
+/// let go of, at up to 0.64 m/s: the posture to hold was that of the plan, which had gone on.
 ///
 /// The change that makes it fail: a hold takes the posture of the plan.
 #[test]
