@@ -76,6 +76,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "control::cycle::law::Leaning<R>",
         "as a compliant run begins under a load: seven joints, a few instructions each",
     ),
+    ("control::cycle::law::Running<R>::is_seeking", "once a run is over: a few instructions"),
     ("control::cycle::law::Posture<R>::effort", "the arm stands: no plan and no feedback is computed"),
     (
         "control::law::operational::OperationalController<R>::release",
