@@ -289,7 +289,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if let Some(deviation) = deviation {
             let to_world = measured.frames.tool_to_world();
             let error = Wrench { torque: deviation.wrench.torque * tracking.moment_share, ..deviation.wrench };
-            let command = self.force.command(
+            let command = self.force.calm_command(
                 &-error.in_world(to_world),
                 tracking.force_proportional,
                 tracking.force_integral,

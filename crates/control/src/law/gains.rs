@@ -27,13 +27,13 @@ struct Numbers {
 /// friction (decision 0093). Clamp times stiffness is the most a blocked joint pushes with, and that has to be more
 /// than its friction.
 const STIFF: Numbers = Numbers {
-    stiffness: [250.0, 300.0, 105.0, 130.0, 10.0, 16.0, 2.5],
-    damping: [18.0, 22.0, 4.5, 5.0, 0.3, 0.5, 0.07],
+    stiffness: [250.0, 280.0, 105.0, 130.0, 10.0, 16.0, 2.5],
+    damping: [18.0, 18.5, 4.5, 5.0, 0.3, 0.5, 0.07],
     clamp: [0.10, 0.10, 0.10, 0.10, 0.20, 0.15, 0.20],
     pose: 2.0,
     posture: 1.0,
     // What comes fast is the inertia of the hand, which drives the cables where there is no friction.
-    force: (0.1, 2.0),
+    force: (0.05, 2.0),
     moment_share: 1.0,
     force_window: periods(0.2) as usize,
     force_limit: (10.0, 1.0),
@@ -48,7 +48,7 @@ const COMPLIANT: Numbers = Numbers {
     clamp: [0.3; 7],
     pose: 3.0,
     posture: 1.0,
-    force: (0.8, 8.0),
+    force: (0.8, 7.5),
     moment_share: 0.4,
     force_window: periods(0.5) as usize,
     // With what pushes, less than what bends the spring by the 0.3 m from which on an arm is off its plan.

@@ -64,6 +64,17 @@ impl<R: Real, const D: usize, const CAPACITY: usize> Window<R, D, CAPACITY> {
         }
     }
 
+    /// The error that was taken in so many control periods before the last one; `None` if the window has none so old.
+    pub fn before(&self, periods: usize) -> Option<&SVector<R, D>> {
+        let back = periods + 1;
+        let at = match self.next.checked_sub(back) {
+            Some(at) => at,
+            None if self.full => (self.next + self.length).checked_sub(back)?,
+            None => return None,
+        };
+        self.errors.get(at)
+    }
+
     /// Sum of the errors in the window.
     pub fn sum(&self) -> &SVector<R, D> {
         &self.sum

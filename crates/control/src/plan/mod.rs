@@ -5,6 +5,7 @@ pub mod bounds;
 pub(crate) mod brake;
 pub(crate) mod goal;
 pub mod hand;
+pub mod inertia;
 pub(crate) mod lift;
 pub mod load;
 pub mod primitive;

@@ -8,6 +8,7 @@ use crate::guard::watch::{Surprise, Watch};
 use crate::plan::brake::brake;
 use crate::plan::goal::GoalFilter;
 use crate::plan::hand::Grasp;
+use crate::plan::inertia::Inertia;
 use crate::plan::load::within_reach;
 use crate::plan::primitive::{Coupling, Primitive, Reference, Rollout, StartState, configuration, posture_and_hand};
 use crate::real::{Real, at_least};
@@ -90,6 +91,8 @@ pub(crate) struct Run<R: Real, const N: usize> {
     deviation: Option<Deviation<R>>,
     /// The filtered deviation, by which a compliant run bends, and any run in which the hand grasps.
     smoothed: SmoothedWrench<R>,
+    /// Mass of a plan that bends.
+    inertia: Inertia<R>,
     /// True while the hand holds something, or closes where it stands in a compliant run.
     grasps: bool,
     watch: Watch<R>,
@@ -156,6 +159,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             coupling: Coupling::NONE,
             deviation: None,
             smoothed: SmoothedWrench::new(),
+            inertia: Inertia::new(),
             grasps: false,
             watch: Watch::new(),
             kept: FADE,
@@ -311,7 +315,8 @@ impl<R: Real, const N: usize> Run<R, N> {
             if !self.options.finger_feedback {
                 seen.gauges = [R::constant(0.0); 3];
             }
-            self.coupling = primitive.coupling(&self.rollout, &seen.error())?;
+            let inertia = (self.options.compliant || grasps).then_some(&mut self.inertia);
+            self.coupling = primitive.coupling(&self.rollout, &seen.error(), inertia)?;
         }
         // A plan that springs back tips what has just been grasped, and one that goes on giving way pulls at it.
         self.lead_goal(primitive);

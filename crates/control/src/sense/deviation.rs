@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 
 use crate::real::{Real, sqrt};
-use crate::time::PERIOD;
+use crate::sense::filter::share;
 use crate::units::{Vector6, Wrench};
 
 /// Sensor values: force x, y, z (N, world axes), torque x, y, z (N m, tool axes at the grasp point), torque of the
@@ -27,12 +27,6 @@ pub const FEEDBACK_CUT_OFF: f64 = 4.0;
 /// The same of a hand that grips (Hz): what it holds swings with it and adds to the mass that the wrist sensor feels.
 /// At [`FEEDBACK_CUT_OFF`] the plan, the hand and an object of 0.9 kg swing at 12 Hz.
 pub const GRIPPING_CUT_OFF: f64 = 1.0;
-
-/// Share of a new value in the filtered one, from one control period to the next.
-const fn share(cut_off: f64) -> f64 {
-    let turn = core::f64::consts::TAU * cut_off * PERIOD;
-    turn / (1.0 + turn)
-}
 
 /// The expected sensor values of one tick, and the deviation of the measured ones. `F` is what the environment does to
 /// the robot.

@@ -1,4 +1,4 @@
-//! Causal second-order Butterworth low-pass, the one filter of this crate.
+//! Low-passes: a causal second-order Butterworth filter, and the share of a new value in one of first order.
 //!
 //! `y_k = b0 (x_k + 2 x_{k-1} + x_{k-2}) - a1 y_{k-1} - a2 y_{k-2}`, by the bilinear transform with pre-warping, so
 //! that the gain at the cut-off is exactly `1/sqrt(2)`. Its delay far below the cut-off is `sqrt(2) / (2 pi f_c)`.
@@ -6,6 +6,14 @@
 use nalgebra::SVector;
 
 use crate::real::Real;
+use crate::time::PERIOD;
+
+/// Share of a new value in the filtered one of a low-pass of first order with this cut-off (Hz), from one control
+/// period to the next.
+pub(crate) const fn share(cut_off: f64) -> f64 {
+    let turn = core::f64::consts::TAU * cut_off * PERIOD;
+    turn / (1.0 + turn)
+}
 
 /// Coefficients of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]

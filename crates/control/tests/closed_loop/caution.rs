@@ -108,7 +108,8 @@ fn g14_an_approach_that_begins_derated_takes_twice_the_time() {
     let time = |caution: Caution| {
         let mut rig = holding();
         rig.cycle.set_caution(caution);
-        rig.command(Command::Approach { q: GOAL.map(|q| q as f32), duration: 0.0 });
+        // Long, beside the time that the arm takes to settle.
+        rig.command(Command::Approach { q: GOAL.map(|q| q as f32), duration: 4.0 });
         let begin = rig.number;
         rig.until(State::Hold, 40.0);
         let off = (0..7).map(|joint| (rig.plant.q[joint] - GOAL[joint]).abs()).fold(0.0, f64::max);

@@ -121,12 +121,12 @@ fn force_control_gives_way_to_a_moment_about_the_axis_it_acts_on() {
     let wanted: [f64; 7] =
         std::array::from_fn(|joint| (0..3).map(|axis| jacobian.0[(3 + axis, joint)] * beyond[axis]).sum());
     let dot = |a: &[f64; 7], b: &[f64; 7]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    // -J^T (P (F_des - F) + K_i integral): the gain has grown from 0.1 towards 0.5.
+    // -J^T (P (F_des - F) + K_i integral): the gain has grown from 0.05 towards 0.45.
     let gain = dot(&difference, &wanted) / dot(&wanted, &wanted);
     let rest: [f64; 7] = std::array::from_fn(|joint| difference[joint] - gain * wanted[joint]);
     let share = (dot(&rest, &rest) / dot(&difference, &difference)).sqrt();
     println!("gain {gain}, share of the torque elsewhere {share}");
-    assert!((0.3..0.45).contains(&gain), "gain {gain}");
+    assert!((0.25..0.4).contains(&gain), "gain {gain}");
     // 0.27 is left by encoder counts times the stiff gains of J2 and J3, and by J5 creeping in its friction; with the
     // moment left in tool axes it is 0.94.
     assert!(share < 0.4, "{share} of the torque acts about other axes: {difference:?} for {wanted:?}");
@@ -256,7 +256,7 @@ fn b7_a_sensor_with_the_wrong_sign_is_contradicted_by_the_joints_and_stops_the_r
     println!("{hardest:.1} N, {farthest:.3?} m, {slowest:.3?} s");
     // The right sign presses with up to 25 N here.
     assert!(hardest < 25.0 && farthest[1] < 0.5 * DISPLACEMENT && farthest[0] < 0.1, "{hardest} N, {farthest:?} m");
-    assert!(slowest[1] <= 0.5 && slowest[0] <= 1.3, "{slowest:?} s");
+    assert!(slowest[1] <= 0.5 && slowest[0] <= 1.35, "{slowest:?} s");
 }
 
 /// Way (m) by which one wild sample of `outlier` (N) moves the plan of a run that `push` (N) bends already.
@@ -448,12 +448,12 @@ fn given_way(push: f64, force_control: bool) -> (f64, f64) {
     (way * push.signum(), fastest)
 }
 
-/// The gain at rest is 4.8, so a push of 2 N and the 8 N that are the most bend the spring about five times as far as
+/// The gain at rest is 4.55, so a push of 2 N and the 8 N that are the most bend the spring about five times as far as
 /// the push alone, less a dead band. The change that makes it fail: what gives way is cut as what presses on nothing,
 /// 3.1 and 3.4 times.
 #[test]
 fn force_control_gives_way_with_its_whole_gain_and_does_not_throw_the_hand_once_the_push_has_ended() {
-    for (push, times) in [(1.0, 4.0), (-1.0, 4.0), (2.0, 3.8), (-2.0, 4.5), (3.0, 2.7), (-3.0, 3.3)] {
+    for (push, times) in [(1.0, 3.8), (-1.0, 3.8), (2.0, 3.8), (-2.0, 4.3), (3.0, 2.7), (-3.0, 3.3)] {
         let ((with, fastest), (without, spring)) = (given_way(push, true), given_way(push, false));
         println!("{push} N: {with:.4} m and {fastest:.3} m/s, without {without:.4} m and {spring:.3} m/s");
         assert!(with > times * without, "{push} N: {with} m, the spring alone {without} m");

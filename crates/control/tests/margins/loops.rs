@@ -103,17 +103,27 @@ impl Loop {
     }
 }
 
-/// Kicks one loop. `None`: it never came to rest, or a monitor stopped the arm.
+/// Why there is no rest of a kick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stop {
+    /// A monitor stopped the nominal loop before the kick: the arm was pushed to a limit of its joints or to a singular
+    /// posture.
+    Before,
+    /// A monitor stopped the arm behind it.
+    Behind,
+}
+
+/// Kicks one loop.
 pub(crate) fn kick(
     gains: &Gains<f64>,
     law: Law,
     q: [f64; 7],
     variation: Variation,
     push: Vector3<f64>,
-) -> Option<Rest> {
+) -> Result<Rest, Stop> {
     let kicked = course(gains, law, q, variation, push, KICK)?;
     let alone = course(gains, law, q, variation, push, 0.0)?;
-    Some(rest(&kicked.iter().zip(&alone).map(|(kicked, alone)| kicked - alone).collect::<Vec<_>>()))
+    Ok(rest(&kicked.iter().zip(&alone).map(|(kicked, alone)| kicked - alone).collect::<Vec<_>>()))
 }
 
 /// An arm that has come to rest under this law; from now on what varies acts. `None`: a monitor stopped it before.
@@ -166,7 +176,9 @@ fn settled(gains: &Gains<f64>, law: Law, q: [f64; 7], variation: Variation, push
             }));
             arm.run_for(0.3);
             arm.plant.push = push;
-            arm.run_for(3.0);
+            if !arm.run_for(3.0) {
+                return None;
+            }
         }
     }
     arm.run_for(0.2);
@@ -182,8 +194,8 @@ fn course(
     variation: Variation,
     push: Vector3<f64>,
     kick: f64,
-) -> Option<Vec<Vector7<f64>>> {
-    let mut arm = settled(gains, law, q, variation, push)?;
+) -> Result<Vec<Vector7<f64>>, Stop> {
+    let mut arm = settled(gains, law, q, variation, push).ok_or(Stop::Before)?;
     if variation.pressed.is_some() {
         arm.run_for(PRESS);
     }
@@ -203,7 +215,7 @@ fn course(
         Law::SoftStop => State::SoftStop,
         Law::Run { .. } => State::Run,
     };
-    (arm.cycle.state() == wanted && arm.plant.omega.amax().is_finite()).then_some(seen)
+    if arm.cycle.state() == wanted && arm.plant.omega.amax().is_finite() { Ok(seen) } else { Err(Stop::Behind) }
 }
 
 /// Presses a joint against its limit. Returns in how many control periods it was beyond, and in how many the flag that

@@ -9,7 +9,7 @@ mod plant;
 use std::collections::BTreeSet;
 
 use control::law::Gains;
-use loops::{Law, Move, beyond_limit, kick, left_on_the_way, shake};
+use loops::{Law, Move, Stop, beyond_limit, kick, left_on_the_way, shake};
 use nalgebra::Vector3;
 use plant::{SUBSTEPS, Variation};
 
@@ -57,29 +57,15 @@ const LAWS: [(&str, Law); 10] = [
 ];
 
 /// Loops that do not pass: the law, and the variations. One that passes has to leave the list.
-const OPEN: [(&str, &[&str]); 5] = [
-    // The integral of the posture, too strong for half the stiffness: J7 swings at 4 Hz.
-    ("approach", &["gain x0.5"]),
+const OPEN: [(&str, &[&str]); 4] = [
     // Nothing but gravity torque carries what the arm does not know of: it sinks, and a monitor stops it.
     ("teach", &["payload 1 kg"]),
     // Force control that presses on with a hard wall that holds on.
     ("run, compliant, Eq 12", &["3000 N/m y", "3000 N/m z"]),
-    // A wall that holds on to a hand that gives way; and half of gravity's torque, or a kilogram nobody knows of, which
-    // a monitor finds once the hand has given way by a quarter of a metre. No mode of the host has Eq (8) alone.
-    (
-        "run, compliant, Eq 8",
-        &[
-            "gain x0.5",
-            "2 cycles late",
-            "payload 1 kg",
-            "200 N/m y",
-            "1000 N/m y",
-            "1000 N/m z",
-            "3000 N/m x",
-            "3000 N/m y",
-        ],
-    ),
-    ("run, compliant, Eqs 8, 12", &["payload 1 kg", "200 N/m y", "1000 N/m y", "3000 N/m y"]),
+    // A wall that holds on to a hand that gives way; and a kilogram nobody knows of, which a monitor finds once the hand
+    // has given way by a quarter of a metre. No mode of the host has Eq (8) alone.
+    ("run, compliant, Eq 8", &["payload 1 kg", "1000 N/m y", "3000 N/m y"]),
+    ("run, compliant, Eqs 8, 12", &["200 N/m y", "1000 N/m y", "3000 N/m y"]),
 ];
 
 /// Loops that do not pass either at 500 Hz: the gains are those of 300 Hz, nobody tuned them for another rate. The
@@ -88,7 +74,11 @@ const OPEN_AT_500: [(&str, &[&str]); 1] = [("hold", &["gain x0.5"])];
 
 /// The poses: [`POSES`], or twelve that nobody chose gains on, drawn with the seed `TACTUS_MARGIN_SEED`.
 fn poses() -> Vec<(String, [f64; 7])> {
-    let Some(seed) = drawn() else { return POSES.map(|(name, q)| (name.to_owned(), q)).into() };
+    drawn().map_or_else(|| POSES.map(|(name, q)| (name.to_owned(), q)).into(), poses_of)
+}
+
+/// Twelve poses of this seed.
+fn poses_of(seed: u64) -> Vec<(String, [f64; 7])> {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     let mut draw = |(min, max): (f64, f64)| {
         state ^= state << 13;
@@ -96,7 +86,7 @@ fn poses() -> Vec<(String, [f64; 7])> {
         state ^= state << 17;
         min + (max - min) * (state >> 11) as f64 / (1u64 << 53) as f64
     };
-    (1..=12).map(|number| (format!("drawn {number}"), DRAWN.map(&mut draw))).collect()
+    (1..=12).map(|number| (format!("drawn {seed}/{number}"), DRAWN.map(&mut draw))).collect()
 }
 
 fn drawn() -> Option<u64> {
@@ -160,11 +150,11 @@ fn worst(law: Law, variation: Variation) -> (f64, String) {
     for (pose, q) in poses() {
         for push in pushes(law) {
             let (share, words) = match kick(&Gains::tuned(), law, q, variation, push) {
-                Some(rest) => {
+                Ok(rest) => {
                     let words = format!("{:8.3}  J{} {:5.1} Hz  {pose}", rest.share, rest.joint, rest.frequency);
                     (rest.share, words)
                 }
-                None => (f64::INFINITY, format!(" stopped               {pose}")),
+                Err(_) => (f64::INFINITY, format!(" stopped               {pose}")),
             };
             if share > worst.0 {
                 worst = (share, words);
@@ -203,6 +193,63 @@ fn every_loop_that_is_not_listed_is_stable_without_friction_and_every_listed_one
         }
     }
     assert!(drawn().is_some() || wrong.is_empty(), "not as listed:\n{}", wrong.join("\n"));
+}
+
+/// Seeds of the poses on which no gain was chosen.
+const UNSEEN: [u64; 2] = [21, 22];
+
+/// Largest part of the pushes that may bring the arm to a limit of its joints, or to a singular posture, before any
+/// kick: a quarter of a metre from a pose that was drawn may lead anywhere.
+const UNREACHED: f64 = 0.1;
+
+/// Variations for poses that were drawn: gain, delay and cables.
+const MARGINS: [&str; 7] =
+    ["nominal", "gain x1.4", "gain x2", "gain x0.5", "1 cycle late", "cables x0.8", "cables x1.2"];
+
+/// Every law that the host asks for, in poses that nobody chose gains on. At half the gain a plan that bends follows
+/// half of the gravity torque: there it is left out.
+///
+/// The changes that make it fail: P of Eq (12) without what is 10 ms old; a plan that bends without a mass; the posture
+/// integral with its whole rate at the edge of its band.
+#[test]
+fn every_law_of_the_host_has_its_margins_in_poses_on_which_no_gain_was_chosen() {
+    let laws: Vec<_> = LAWS.into_iter().filter(|(name, _)| *name != "run, compliant, Eq 8").collect();
+    let poses: Vec<_> = UNSEEN.into_iter().flat_map(poses_of).collect();
+    let mut jobs = Vec::new();
+    for (name, law) in laws {
+        let half = matches!(law, Law::Run { .. });
+        let all = variations(law).into_iter().filter(|(what, _)| MARGINS.contains(&what.as_str()));
+        for (what, variation) in all.filter(|(what, _)| !(half && what == "gain x0.5")) {
+            for (pose, q) in &poses {
+                for push in pushes(law) {
+                    jobs.push((name, law, what.clone(), variation, pose, *q, push));
+                }
+            }
+        }
+    }
+    let half = jobs.len() / 2;
+    let outcomes = std::thread::scope(|scope| {
+        let workers = [&jobs[..half], &jobs[half..]].map(|jobs| {
+            scope.spawn(move || {
+                let kicked = |job: &(_, Law, _, Variation, _, [f64; 7], Vector3<f64>)| {
+                    kick(&Gains::tuned(), job.1, job.5, job.3, job.6)
+                };
+                jobs.iter().map(kicked).collect::<Vec<_>>()
+            })
+        });
+        workers.into_iter().flat_map(|worker| worker.join().expect("a worker")).collect::<Vec<_>>()
+    });
+    let (mut wrong, mut worst, mut unreached) = (Vec::new(), 0.0f64, 0);
+    for ((name, _, what, _, pose, q, push), outcome) in jobs.iter().zip(outcomes) {
+        match outcome {
+            Ok(rest) if rest.share <= PASSED => worst = worst.max(rest.share),
+            Err(Stop::Before) => unreached += 1,
+            other => wrong.push(format!("{name}, {what}, {pose} {q:.2?}, pushed by {} N: {other:.3?}", push.x)),
+        }
+    }
+    println!("{} kicks, {unreached} not reached, {worst:.3} left at most\n{}", jobs.len(), wrong.join("\n"));
+    let few = f64::from(unreached) <= UNREACHED * jobs.len() as f64;
+    assert!(wrong.is_empty() && few, "{} of {} fail, {unreached} not reached", wrong.len(), jobs.len());
 }
 
 #[test]

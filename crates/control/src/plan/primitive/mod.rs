@@ -15,6 +15,7 @@ pub use rows::{
 pub use crate::guard::watch::{STATISTICS_CAPACITY, STATISTICS_CHANNELS, SensorStatistics};
 pub use crate::sense::deviation::SENSORS;
 
+use crate::plan::inertia::Inertia;
 use dmp::{CouplingGains, PhaseTable, PoseCoupling, PrimitiveError, RolloutError, Scalar, TableError};
 
 /// Rows with feedback: position 3, orientation 3, hand 4 (the spread has no gauge).
@@ -37,10 +38,12 @@ pub type ExpectedWrench<T> = dmp::ExpectedSensors<T, SENSORS, EXPECTED_CAPACITY>
 pub struct Feedback<T> {
     gains: CouplingGains<T, COUPLED_ROWS, SENSORS, GAIN_CAPACITY>,
     limits: Limits<T>,
+    /// Largest `K1 K2` of each position row over the phase.
+    largest: [T; 3],
 }
 
 impl<T: Scalar> Feedback<T> {
-    const EMPTY: Self = Self { gains: CouplingGains::EMPTY, limits: Limits::NONE };
+    const EMPTY: Self = Self { gains: CouplingGains::EMPTY, limits: Limits::NONE, largest: [T::ZERO; 3] };
 
     /// With sensitivity `K1` per coupled row, weight `K2` per sensor, and limits ([`limits`]).
     ///
@@ -52,7 +55,9 @@ impl<T: Scalar> Feedback<T> {
         limits: Limits<T>,
     ) -> Result<Self, TableError> {
         limits.check()?;
-        Ok(Self { gains: CouplingGains::new(sensitivity, weight)?, limits })
+        let gains = CouplingGains::new(sensitivity, weight)?;
+        let largest = largest(&gains);
+        Ok(Self { gains, limits, largest })
     }
 
     /// `K1` and `K2`.
@@ -67,15 +72,30 @@ impl<T: Scalar> Feedback<T> {
 
     /// `zeta` at progress `u` for the error `F - F_expected`, within the limits. Forces are in the world frame and
     /// torques in the body frame at the controlled point: `J^T` only sorts them.
-    fn coupling<const N: usize>(&self, movement: &Movement<T, N>, u: T, error: &[T; SENSORS]) -> Coupling<T> {
+    fn coupling<const N: usize>(
+        &self,
+        movement: &Movement<T, N>,
+        u: T,
+        error: &[T; SENSORS],
+        carried: impl FnOnce([T; 3]) -> [T; 3],
+    ) -> Coupling<T> {
         let [px, py, pz, rx, ry, rz, hand @ ..] = self.gains.zeta(u, error, |weighted| {
             let [fx, fy, fz, tx, ty, tz, f1, f2, f3] = *weighted;
             [fx, fy, fz, tx, ty, tz, T::ZERO, f1, f2, f3]
         });
-        let pose = PoseCoupling { position: [px, py, pz], orientation: [rx, ry, rz] };
+        let pose = PoseCoupling { position: carried([px, py, pz]), orientation: [rx, ry, rz] };
         let zeta = Coupling { poses: [pose], points: points([T::ZERO; POSTURE_ROWS], hand) };
         movement.limited_coupling(&zeta, &self.limits)
     }
+}
+
+/// Largest `K1 K2` of each position row over the phase. Both are straight lines between their samples.
+fn largest<T: Scalar>(gains: &CouplingGains<T, COUPLED_ROWS, SENSORS, GAIN_CAPACITY>) -> [T; 3] {
+    fn most<T: Scalar, const COLUMNS: usize>(samples: &[[T; COLUMNS]], column: usize) -> T {
+        let values = samples.iter().filter_map(|sample| sample.get(column));
+        values.fold(T::ZERO, |most, value| if *value > most { *value } else { most })
+    }
+    core::array::from_fn(|row| most(gains.sensitivity().samples(), row) * most(gains.weight().samples(), row))
 }
 
 /// A movement with the memory of its sensors; `N` = kernel capacity.
@@ -168,10 +188,12 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
             Some(feedback) => {
                 self.feedback.gains.copy_from(&feedback.gains);
                 self.feedback.limits = feedback.limits;
+                self.feedback.largest = feedback.largest;
             }
             None => {
                 self.feedback.gains.clear();
                 self.feedback.limits = Limits::NONE;
+                self.feedback.largest = [T::ZERO; 3];
             }
         }
     }
@@ -207,6 +229,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         limits.check()?;
         self.feedback.gains.assign(sensitivity, weight)?;
         self.feedback.limits = limits;
+        self.feedback.largest = largest(&self.feedback.gains);
         Ok(())
     }
 
@@ -246,16 +269,31 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
     }
 
     /// `zeta` of Eq (8) for this tick from the error `F - F_expected` (environment on the robot); none if the primitive
-    /// has no gains or no expectation.
+    /// has no gains or no expectation. With an `inertia` the plan is no lighter than that.
     ///
     /// # Errors
     /// [`RolloutError::OtherPrimitive`].
-    pub fn coupling(&self, rollout: &Rollout<T, N>, error: &[T; SENSORS]) -> Result<Coupling<T>, RolloutError> {
+    pub fn coupling(
+        &self,
+        rollout: &Rollout<T, N>,
+        error: &[T; SENSORS],
+        inertia: Option<&mut Inertia<T>>,
+    ) -> Result<Coupling<T>, RolloutError> {
         rollout.check(&self.movement)?;
         let (Some(feedback), Some(_)) = (self.feedback(), self.expected()) else {
             return Ok(Coupling::NONE);
         };
         let trust = self.trust(rollout);
-        Ok(feedback.coupling(&self.movement, rollout.progress(), &error.map(|error| error * trust)))
+        let rate = self.movement.rate() * rollout.speed();
+        let carried = |zeta| match &inertia {
+            Some(inertia) => inertia.carried(zeta, &feedback.largest, rate),
+            None => zeta,
+        };
+        let error = error.map(|error| error * trust);
+        let coupling = feedback.coupling(&self.movement, rollout.progress(), &error, carried);
+        if let Some(inertia) = inertia {
+            inertia.follow(&coupling.poses[0].position);
+        }
+        Ok(coupling)
     }
 }
