@@ -31,16 +31,13 @@ impl<T: Scalar> Inertia<T> {
         Inertia { slow: [T::ZERO; 3] }
     }
 
-    /// `zeta` of the position rows as a plan of this mass follows it. `gains` are the largest `K1 K2` of these rows, and
+    /// `zeta` of the position rows as a plan of this mass follows it. `gain` is the largest `K1 K2` of these rows, and
     /// `rate` is that of the rollout (1/s).
-    pub(crate) fn carried(&self, wanted: [T; 3], gains: &[T; 3], rate: T) -> [T; 3] {
-        let square = rate * rate * T::from_f64(MASS);
-        let mut zeta = wanted;
-        for ((zeta, slow), gain) in zeta.iter_mut().zip(&self.slow).zip(gains) {
-            let times = *gain * square;
-            if times > T::ONE {
-                *zeta = *slow + (*zeta - *slow) / times;
-            }
+    pub(crate) fn carried(&self, mut zeta: [T; 3], gain: T, rate: T) -> [T; 3] {
+        let times = gain * rate * rate * T::from_f64(MASS);
+        if times > T::ONE {
+            let share = T::ONE / times;
+            zeta.iter_mut().zip(&self.slow).for_each(|(zeta, slow)| *zeta = *slow + (*zeta - *slow) * share);
         }
         zeta
     }

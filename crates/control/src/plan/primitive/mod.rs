@@ -38,12 +38,12 @@ pub type ExpectedWrench<T> = dmp::ExpectedSensors<T, SENSORS, EXPECTED_CAPACITY>
 pub struct Feedback<T> {
     gains: CouplingGains<T, COUPLED_ROWS, SENSORS, GAIN_CAPACITY>,
     limits: Limits<T>,
-    /// Largest `K1 K2` of each position row over the phase.
-    largest: [T; 3],
+    /// Largest `K1 K2` of a position row over the phase.
+    largest: T,
 }
 
 impl<T: Scalar> Feedback<T> {
-    const EMPTY: Self = Self { gains: CouplingGains::EMPTY, limits: Limits::NONE, largest: [T::ZERO; 3] };
+    const EMPTY: Self = Self { gains: CouplingGains::EMPTY, limits: Limits::NONE, largest: T::ZERO };
 
     /// With sensitivity `K1` per coupled row, weight `K2` per sensor, and limits ([`limits`]).
     ///
@@ -89,13 +89,14 @@ impl<T: Scalar> Feedback<T> {
     }
 }
 
-/// Largest `K1 K2` of each position row over the phase. Both are straight lines between their samples.
-fn largest<T: Scalar>(gains: &CouplingGains<T, COUPLED_ROWS, SENSORS, GAIN_CAPACITY>) -> [T; 3] {
+/// Largest `K1 K2` of a position row over the phase. Both are straight lines between their samples.
+fn largest<T: Scalar>(gains: &CouplingGains<T, COUPLED_ROWS, SENSORS, GAIN_CAPACITY>) -> T {
     fn most<T: Scalar, const COLUMNS: usize>(samples: &[[T; COLUMNS]], column: usize) -> T {
         let values = samples.iter().filter_map(|sample| sample.get(column));
         values.fold(T::ZERO, |most, value| if *value > most { *value } else { most })
     }
-    core::array::from_fn(|row| most(gains.sensitivity().samples(), row) * most(gains.weight().samples(), row))
+    let of = |row| most(gains.sensitivity().samples(), row) * most(gains.weight().samples(), row);
+    (0..3).map(of).fold(T::ZERO, |most, gain| if gain > most { gain } else { most })
 }
 
 /// A movement with the memory of its sensors; `N` = kernel capacity.
@@ -193,7 +194,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
             None => {
                 self.feedback.gains.clear();
                 self.feedback.limits = Limits::NONE;
-                self.feedback.largest = [T::ZERO; 3];
+                self.feedback.largest = T::ZERO;
             }
         }
     }
@@ -286,7 +287,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         let trust = self.trust(rollout);
         let rate = self.movement.rate() * rollout.speed();
         let carried = |zeta| match &inertia {
-            Some(inertia) => inertia.carried(zeta, &feedback.largest, rate),
+            Some(inertia) => inertia.carried(zeta, feedback.largest, rate),
             None => zeta,
         };
         let error = error.map(|error| error * trust);
