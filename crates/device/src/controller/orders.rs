@@ -44,7 +44,7 @@ impl DeviceController {
                     self.tell(EventKind::Refused(Refusal::HandBusy), io);
                 } else if !self.cycle.state().has_torque() && self.safety_mode == Some(SafetyMode::Idle) {
                     // Under a latched fault too: what has lost its zero cannot be cleared before.
-                    self.startup.zero(&home);
+                    self.startup.zero_again(&home, now_us, self.cycle.last_counts());
                 } else {
                     self.tell(EventKind::Refused(Refusal::ZeroNeedsIdle), io);
                 }

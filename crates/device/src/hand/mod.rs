@@ -67,9 +67,9 @@ impl Hand {
         }
     }
 
-    /// The start-up is over and has found this.
+    /// The start-up is over and has found this. One that a failed zeroing has begun has suspended no hand.
     pub(crate) fn begin(&mut self, found: Found) {
-        let (told, was_ready) = (self.told, self.was_ready);
+        let (told, was_ready) = (self.told, self.was_ready || self.stage == HandStage::Ready);
         *self = Hand { told, ..Hand::new() };
         match found {
             Found::Nothing(cause) => self.cause = cause,

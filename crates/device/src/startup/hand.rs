@@ -218,8 +218,9 @@ impl Startup {
         })
     }
 
-    /// Returns the result for the hand, once after each time it was read.
+    /// Returns the result for the hand, once after each time it was read. What has slept before is no news any more.
     pub(crate) fn take_hand(&mut self) -> Option<Found> {
+        self.hand.slept = false;
         self.hand.found.take()
     }
 }

@@ -1,7 +1,8 @@
 //! The second half of the start-up: a person says where the arm stands, the pucks and the safety module are told.
 
-use puck::{Group, Node, PropertyId, SafetyMode, get, set};
+use puck::{Counts, Group, Node, PropertyId, SafetyMode, get, set};
 
+use super::continuity::Continuity;
 use super::home::home_counts;
 use super::rest::Rest;
 use super::{Next, POLL_US, REVOCATIONS, Startup, Step, ZeroRequest, after};
@@ -29,6 +30,15 @@ impl Startup {
             Ok(()) => ZeroRequest::Pending,
             Err(reason) => ZeroRequest::Answered(Err(reason)),
         };
+    }
+
+    /// The same out of the cyclic loop. Until the first position is written the old zero counts, and where the zeroing
+    /// comes to nothing the loop goes on with it: counts are not to change unseen meanwhile. `last` as for a restart.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn zero_again(&mut self, home: &[f32; 7], now_us: u64, last: Option<[(Counts, u8); 7]>) {
+        self.zero(home);
+        self.continuity = Some(Continuity::since(now_us, last));
     }
 
     fn accept_zero(&mut self, home: &[f32; 7]) -> Result<(), Refusal> {

@@ -465,6 +465,33 @@ fn a_hand_woken_by_a_start_up_that_failed_is_not_taken_for_one_that_kept_its_pow
 }
 
 #[test]
+fn a_hand_that_is_ready_stays_so_over_a_zeroing_that_fails() {
+    let (mut core, mut bus) = holding_with_ready_hand();
+    bus.press_idle();
+    bus.run(&mut core, 0.2);
+    bus.pucks[3].ignores_position_writes = true;
+    bus.commands.push_back(Command::Zero { home: crate::double::HOME });
+    bus.run_until(&mut core, Stage::Blocked);
+    bus.pucks[3].ignores_position_writes = false;
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: crate::double::HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.run(&mut core, 0.5);
+    assert_eq!(core.health().hand, HandStage::Ready, "it kept its power: its fingers need not open again");
+
+    // One that loses its power meanwhile has lost its positions.
+    bus.pucks[3].ignores_position_writes = true;
+    bus.commands.push_back(Command::Zero { home: [0.1, 0.5, 0.1, 1.5, 0.1, 0.2, 0.1] });
+    bus.run_until(&mut core, Stage::Blocked);
+    bus.pucks[3].ignores_position_writes = false;
+    bus.digits.iter_mut().for_each(crate::digit::Digit::lose_power);
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: crate::double::HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    assert_eq!(core.health().hand, HandStage::NotInitialised);
+}
+
+#[test]
 fn commands_to_the_hand_before_the_end_of_the_start_up_are_refused_with_its_stage() {
     let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());
     bus.run_until(&mut core, Stage::WaitingForZero);

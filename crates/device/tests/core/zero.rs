@@ -284,6 +284,47 @@ fn g2_a_jump_that_could_have_been_a_motion_is_told_by_the_absolute_angle_of_the_
     assert!(believes_jump(0, 4096, |_| {}), "by a whole revolution");
 }
 
+/// G2: a zeroing of an arm that is zeroed comes to nothing: the safety module is not heard, or the arm is activated
+/// behind it. Meanwhile the counts of a motor `jump`, and the old zero is to go on. True if the arm is still zeroed.
+fn keeps_zero_of_before(is_heard: bool, joint: usize, jump: i32) -> bool {
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
+    // Such a motor tells its counts alone.
+    bus.pucks[joint].beyond_angle = None;
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.run(&mut core, 0.2);
+    bus.deaf = !is_heard;
+    bus.commands.push_back(Command::Zero { home: HOME });
+    if is_heard {
+        bus.run_slots(&mut core, 8);
+        bus.press_activate();
+    } else {
+        bus.run_until(&mut core, Stage::Blocked);
+        bus.deaf = false;
+        bus.run(&mut core, 0.1);
+    }
+    bus.pucks[joint].position.0 += jump;
+    bus.run(&mut core, 4.0);
+    let health = core.health();
+    assert!(bus.events.iter().any(|event| matches!(event, EventKind::Refused(_))), "{:?}", bus.events);
+    if !health.zeroed {
+        assert_nothing_leads_on(&mut core, &mut bus);
+        assert_zeroing_leads_on(&mut core, &mut bus);
+    }
+    health.zeroed
+}
+
+#[test]
+fn g2_counts_that_jump_while_a_zeroing_comes_to_nothing_cost_the_zero_of_before() {
+    for is_heard in [true, false] {
+        for (joint, jump) in [(0, 12_000), (3, 8_000), (6, -12_000)] {
+            assert!(keeps_zero_of_before(is_heard, joint, 0), "M{} stands", joint + 1);
+            assert!(!keeps_zero_of_before(is_heard, joint, jump), "M{} by {jump}, heard: {is_heard}", joint + 1);
+        }
+    }
+}
+
 /// G2: the counts of a second zero differ from those of the first, and the motors have not turned.
 #[test]
 fn g2_a_second_zero_is_not_compared_with_the_angles_of_the_first() {
