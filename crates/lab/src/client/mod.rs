@@ -57,6 +57,9 @@ const KEEP_ALIVE: Duration = Duration::from_millis(100);
 /// device refuses such a request when it is older than 500 ms.
 const FRESH: Duration = Duration::from_millis(200);
 
+/// A wait may end so much later than it should. Where one lasts longer, this program was suspended and did not listen.
+const LATE: Duration = Duration::from_millis(200);
+
 /// Longest wait for another host to be gone. A killed one keeps its session for half a second.
 const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
 
@@ -100,6 +103,10 @@ pub struct Client<T: Transport> {
     sequence: u16,
     device_ms: u32,
     heard: Duration,
+    /// Time for which this host has listened at all: one that was suspended, or at work elsewhere, has not.
+    listened: Duration,
+    /// The same when it last heard of the device.
+    listened_before: Duration,
     sent: Duration,
     incoming: VecDeque<Incoming>,
     answers: VecDeque<Reply>,
@@ -149,6 +156,8 @@ impl<T: Transport> Client<T> {
             sequence: 0,
             device_ms: 0,
             heard: now,
+            listened: Duration::ZERO,
+            listened_before: Duration::ZERO,
             sent: now,
             incoming: VecDeque::new(),
             answers: VecDeque::new(),
@@ -414,8 +423,10 @@ impl<T: Transport> Client<T> {
     fn pump(&mut self, timeout: Duration) -> Result<(), HostError> {
         let mut bytes = std::mem::take(&mut self.received);
         bytes.clear();
+        let begun = self.transport.now();
         // A wait shorter than the step of a virtual clock would not let its time pass at all.
         let received = self.transport.receive(timeout.max(Duration::from_micros(10)), &mut bytes);
+        self.listened += self.transport.now().saturating_sub(begun).min(timeout + LATE);
         let mut rest = bytes.as_slice();
         while let Some(frame) = self.decoder.next::<Reply>(&mut rest) {
             // What the device says to others carries numbers of the same series.
@@ -431,7 +442,7 @@ impl<T: Transport> Client<T> {
     }
 
     fn sort(&mut self, frame: frame::Frame<Reply>) {
-        self.heard = self.transport.now();
+        (self.heard, self.listened_before) = (self.transport.now(), self.listened);
         self.device_ms = frame.envelope.time_ms;
         match frame.message {
             Reply::Telemetry(telemetry) => {
@@ -451,13 +462,14 @@ impl<T: Transport> Client<T> {
         }
     }
 
-    /// The next thing the device sends unasked; `None` if nothing came within `timeout`. Keeps the session alive.
+    /// The next thing the device sends unasked; `None` if nothing came within `timeout` of listening. Keeps the session
+    /// alive.
     ///
     /// # Errors
     /// [`HostError::Interrupted`] after the arm has been stopped, [`HostError::NoAnswer`] if the device has fallen
     /// silent, [`HostError::Refused`] if it knows this host no longer, [`HostError::Transport`].
     pub fn next(&mut self, timeout: Duration) -> Result<Option<Incoming>, HostError> {
-        let deadline = self.transport.now() + timeout;
+        let deadline = self.listened + timeout;
         loop {
             if self.interrupt.is_raised() {
                 return Err(self.interrupted());
@@ -466,22 +478,22 @@ impl<T: Transport> Client<T> {
                 return Ok(Some(incoming));
             }
             self.take_pongs()?;
-            let now = self.transport.now();
-            if now >= deadline {
+            if self.listened >= deadline {
                 return Ok(None);
             }
             // Answers to pings come many times within this; without them the line is dead.
-            let silence = now.saturating_sub(self.heard);
+            let silence = self.listened.saturating_sub(self.listened_before);
             if silence >= self.timeout {
                 return Err(HostError::NoAnswer { request: "ping", after: silence });
             }
+            let now = self.transport.now();
             if now.saturating_sub(self.sent) >= KEEP_ALIVE {
                 self.sequence = self.sequence.wrapping_add(1);
                 let envelope = Envelope { session: self.session, sequence: self.sequence, time_ms: self.device_ms };
                 self.send(envelope, &Request::Ping)?;
             }
             let ping_due = (self.sent + KEEP_ALIVE).saturating_sub(now);
-            self.pump(deadline.saturating_sub(now).min(ping_due))?;
+            self.pump(deadline.saturating_sub(self.listened).min(ping_due))?;
         }
     }
 

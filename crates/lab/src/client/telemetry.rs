@@ -106,9 +106,9 @@ impl<T: Transport> Iterator for TelemetryStream<'_, T> {
 
     /// The next cycle; [`HostError::NoAnswer`] if none came for a second, whatever else did.
     fn next(&mut self) -> Option<Self::Item> {
-        let end = self.client.now() + self.silence;
+        let end = self.client.listened + self.silence;
         loop {
-            return Some(match self.client.next(end.saturating_sub(self.client.now())) {
+            return Some(match self.client.next(end.saturating_sub(self.client.listened)) {
                 Ok(Some(Incoming::Telemetry(telemetry))) => Ok(telemetry),
                 Ok(Some(Incoming::Event(event))) => {
                     self.events.push(event);

@@ -112,6 +112,8 @@ pub(crate) struct Device {
     pub(crate) without_cycles: bool,
     /// Answers that are still to be "the storage is being read".
     pub(crate) reading: u32,
+    /// Steps for which the host is suspended in its next wait.
+    pub(crate) suspended: u32,
     /// Control cycles for which a stop still brakes, and the way of each joint so far (rad).
     pub(crate) braking: (u32, f32),
 }
@@ -146,6 +148,7 @@ impl Device {
             armless: false,
             without_cycles: false,
             reading: 0,
+            suspended: 0,
             braking: (0, 0.0),
         }
     }
@@ -188,6 +191,11 @@ impl Transport for Device {
     }
 
     fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
+        if self.suspended > 0 {
+            // As a read does whose time is over when the program goes on: what has come is still to be read.
+            (0..std::mem::take(&mut self.suspended)).for_each(|_| self.step());
+            return Ok(());
+        }
         let until = self.now() + timeout;
         while self.half.line.is_empty() && self.now() < until {
             self.step();

@@ -15,7 +15,7 @@ use lab::error::HostError;
 use lab::transport::{StreamTransport, Transport, TransportError};
 use link::{LINK_VERSION, Name, Refusal, Request, SCHEMA_HASH};
 
-use fixture::{Device, connected, image};
+use fixture::{Device, STEP, connected, image};
 
 #[test]
 fn connecting_compares_versions_within_200_ms() {
@@ -479,21 +479,42 @@ fn a_second_client_waits_for_the_first_to_be_gone() {
 
 /// The device has let go of a host that was suspended: what that host waits for will never come, however many of its
 /// pings are answered.
+/// Suspended between two waits or in one, for less and for more than a device may be silent: what it hears afterwards
+/// counts, and not that it has heard nothing meanwhile.
 #[test]
-fn a_host_that_the_device_has_let_go_of_does_not_wait_on() {
-    let mut client = connected();
-    client.gravity().unwrap();
-    let device = client.transport();
-    (0..540).for_each(|_| device.step());
-    assert_eq!(device.half.state, State::SoftStop, "600 ms of silence");
-    let started = client.now();
-    let refused = loop {
-        match client.next(Duration::from_secs(10)) {
-            // The device has said that it stops the arm.
-            Ok(Some(_)) => {}
-            other => break other,
+fn a_host_that_the_device_has_let_go_of_does_not_wait_on_and_blames_nobody() {
+    for (milliseconds, in_a_wait) in [(600, false), (600, true), (10_000, false), (10_000, true)] {
+        let mut client = connected();
+        client.gravity().unwrap();
+        let device = client.transport();
+        let steps = milliseconds * 9 / 10;
+        if in_a_wait {
+            device.suspended = steps;
+        } else {
+            (0..steps).for_each(|_| device.step());
         }
-    };
-    assert!(matches!(refused, Err(HostError::Refused { reason: Refusal::NoSession, .. })), "{refused:?}");
-    assert!(client.now() - started < Duration::from_millis(200), "{:?}", client.now() - started);
+        let refused = loop {
+            match client.next(Duration::from_secs(1)) {
+                // The device has said that it stops the arm.
+                Ok(Some(_)) => {}
+                other => break other,
+            }
+        };
+        assert!(matches!(refused, Err(HostError::Refused { reason: Refusal::NoSession, .. })), "{refused:?}");
+        assert_eq!(client.transport().half.state, State::SoftStop, "after {milliseconds} ms of silence");
+        let took = client.now().saturating_sub(STEP * steps);
+        assert!(took < Duration::from_millis(300), "{took:?}");
+    }
+}
+
+#[test]
+fn a_device_that_falls_silent_is_given_up_after_two_seconds_of_listening() {
+    let mut client = connected();
+    client.transport().dead = true;
+    client.transport().suspended = 3 * 900;
+    let begun = client.now();
+    let silent = client.next(Duration::from_secs(10));
+    assert!(matches!(silent, Err(HostError::NoAnswer { request: "ping", .. })), "{silent:?}");
+    let took = client.now() - begun;
+    assert!((Duration::from_secs(4)..Duration::from_secs(6)).contains(&took), "{took:?}");
 }
