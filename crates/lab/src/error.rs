@@ -235,7 +235,9 @@ impl HostError {
             Self::InUse { .. } | Self::Watched { .. } => ErrorCode::Refused(Refusal::Busy),
             Self::Image(_) => ErrorCode::ImageInvalid,
             Self::ReadBack { .. } => ErrorCode::ReadBackDiffers,
-            Self::Transport(TransportError::Closed | TransportError::Io(_)) => ErrorCode::LineClosed,
+            Self::Transport(TransportError::Closed | TransportError::HungUp | TransportError::Io(_)) => {
+                ErrorCode::LineClosed
+            }
             Self::NoAnswer { .. } => ErrorCode::NoAnswer,
             Self::NotStopped { .. } => ErrorCode::NotStopped,
             Self::Interrupted | Self::Left => ErrorCode::Interrupted,
@@ -248,6 +250,11 @@ impl HostError {
         let help = match &self {
             Self::Transport(TransportError::Can(problem)) => problem.help(),
             Self::Address(error) => error.help(),
+            Self::Transport(TransportError::HungUp) => Some(
+                "look whether that program still runs, `tactus sim` for example; a device stops its arm by itself \
+                 after half a second"
+                    .to_owned(),
+            ),
             Self::Watched { .. } => {
                 Some("end one of them; `tactus stop` stops the arm from here, however many look on".to_owned())
             }

@@ -66,6 +66,9 @@ pub enum TransportError {
     /// The other end closed the connection, or the cable was pulled.
     #[error("the connection is closed")]
     Closed,
+    /// The program at the other end of a socket closed it, or ended.
+    #[error("the program that serves the device has closed the connection")]
+    HungUp,
     /// The system reports an error on an open connection.
     #[error("the connection failed: {0}")]
     Io(#[source] std::io::Error),

@@ -84,17 +84,23 @@ impl StreamTransport {
 
 impl Transport for StreamTransport {
     fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
-        self.socket.write_all(bytes).and_then(|()| self.socket.flush()).map_err(TransportError::open)
+        let sent = self.socket.write_all(bytes).and_then(|()| self.socket.flush());
+        sent.map_err(|error| hung_up(TransportError::open(error)))
     }
 
     fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
         self.socket.set_timeout(timeout.max(Duration::from_millis(1))).map_err(TransportError::open)?;
-        read_some(&mut self.socket, out)
+        read_some(&mut self.socket, out).map_err(hung_up)
     }
 
     fn now(&self) -> Duration {
         self.opened.elapsed()
     }
+}
+
+/// A socket has no cable of its own: who has closed it is a program.
+fn hung_up(error: TransportError) -> TransportError {
+    if matches!(error, TransportError::Closed) { TransportError::HungUp } else { error }
 }
 
 /// One read; a time-out is no error, the end of the stream is.

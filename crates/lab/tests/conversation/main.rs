@@ -152,6 +152,9 @@ fn a_closed_socket_and_a_missing_one_are_told_apart() {
     drop(listener);
     let closed = Client::connect(transport, "test").err().unwrap();
     assert_eq!((closed.code().to_string(), closed.code().exit() as u8), ("E701".to_owned(), 7));
+    // Nothing is wrong with a cable where there is none.
+    let help = closed.into_failure("run").help.unwrap_or_default();
+    assert!(help.contains("whether that program still runs") && !help.contains("cable"), "{help}");
     let missing = HostError::from(StreamTransport::tcp(&address).err().unwrap());
     assert_eq!((missing.code().to_string(), missing.code().exit() as u8), ("E301".to_owned(), 3));
 }
