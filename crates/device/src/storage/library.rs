@@ -39,6 +39,11 @@ impl Work {
         let (Self::Save { slot, .. } | Self::Delete { slot }) = self;
         matches!(slot, HOME_KEY | WEIGHT_KEY | SECRET_KEY)
     }
+
+    /// True if it is about the image being written.
+    fn is_of_image(self) -> bool {
+        matches!(self, Self::Save { .. }) && !self.is_of_setting()
+    }
 }
 
 /// Remains of a lost image; all zeros where none is.
@@ -205,7 +210,8 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
             Err(error) => self.fail(error),
         }
         let _ = self.memory.finished();
-        if outcome.is_err() && !work.is_of_setting() {
+        // Beside another change an upload may grow, which is none of its business.
+        if outcome.is_err() && work.is_of_image() {
             self.memory.abort();
         }
         self.job = Job::Over(outcome);
@@ -256,7 +262,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
     /// True if the image being written is on its way to the flash.
     fn is_saving(&self) -> bool {
         match self.job {
-            Job::Asked(work) | Job::Begun(work) => matches!(work, Work::Save { .. }) && !work.is_of_setting(),
+            Job::Asked(work) | Job::Begun(work) => work.is_of_image(),
             Job::None | Job::Over(_) => false,
         }
     }

@@ -129,25 +129,31 @@ fn a_host_that_leaves_in_the_middle_of_a_commit_does_not_undo_it() {
 }
 
 #[test]
-fn a_commit_that_meets_a_busy_storage_can_be_asked_for_again() {
-    let mut rig = rig();
-    rig.send_parts("one", &image("one", 2.0, 10));
-    assert_eq!(rig.ask(Request::UploadCommit), None);
-    rig.session.store_mut().take(&mut [0; SLOT_BYTES]);
-    rig.session.store_mut().settle(Ok(()));
-    rig.poll();
-    rig.send_parts("two", &image("two", 2.0, 10));
-    assert_eq!(rig.ask(Request::Delete { name: name("one") }), None);
-    let refused = rig.ask(Request::UploadCommit);
-    let busy = [StoreError::Busy.code(), 0];
-    assert!(
-        matches!(refused, Some(Reply::Refused { reason: Refusal::StoreFailed, detail, .. }) if detail == busy),
-        "{refused:?}"
-    );
-    assert_eq!(rig.session.store_mut().take(&mut [0; SLOT_BYTES]), Some(Work::Delete { slot: 0 }));
-    rig.session.store_mut().settle(Ok(()));
-    rig.poll();
-    assert_eq!(rig.ask(Request::UploadCommit), None, "it waits for the flash");
+fn a_commit_that_meets_a_busy_storage_can_be_asked_for_again_whatever_becomes_of_the_other_change() {
+    for deleted in [Ok(()), Err(StoreError::Full)] {
+        let mut rig = rig();
+        rig.send_parts("one", &image("one", 2.0, 10));
+        assert_eq!(rig.ask(Request::UploadCommit), None);
+        rig.session.store_mut().take(&mut [0; SLOT_BYTES]);
+        rig.session.store_mut().settle(Ok(()));
+        rig.poll();
+        rig.send_parts("two", &image("two", 2.0, 10));
+        assert_eq!(rig.ask(Request::Delete { name: name("one") }), None);
+        let refused = rig.ask(Request::UploadCommit);
+        let busy = [StoreError::Busy.code(), 0];
+        assert!(
+            matches!(refused, Some(Reply::Refused { reason: Refusal::StoreFailed, detail, .. }) if detail == busy),
+            "{refused:?}"
+        );
+        assert_eq!(rig.session.store_mut().take(&mut [0; SLOT_BYTES]), Some(Work::Delete { slot: 0 }));
+        rig.session.store_mut().settle(deleted);
+        rig.poll();
+        assert_eq!(rig.ask(Request::UploadCommit), None, "it waits for the flash");
+        assert!(rig.session.store_mut().take(&mut [0; SLOT_BYTES]).is_some());
+        rig.session.store_mut().settle(Ok(()));
+        rig.poll();
+        assert_eq!(rig.names(), if deleted.is_ok() { vec!["two"] } else { vec!["one", "two"] });
+    }
 }
 
 #[test]
