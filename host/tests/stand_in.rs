@@ -210,6 +210,28 @@ fn two_may_look_on_a_third_is_told_so_and_the_places_of_killed_ones_are_waited_f
     assert!(listed.status.success(), "{}", String::from_utf8_lossy(&listed.stdout));
 }
 
+#[test]
+fn home_and_payload_are_shown_beside_a_run_and_changed_by_nobody_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let _arm = StandIn::start(at);
+    learn_reach(at);
+    let mut run = observer(at, "--non-interactive run reach.toml --at-home --speed 0.2");
+    until(at, &["approach", "run"]);
+    for (order, shown) in [("calibrate show", "source"), ("calibrate payload", "declared")] {
+        let output = tactus(at, order);
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+        assert!(told[shown].is_string(), "{order}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    for order in ["calibrate forget", "calibrate payload nothing"] {
+        let refused = tactus(at, order);
+        assert!(String::from_utf8_lossy(&refused.stderr).contains("E504"), "{order}: {refused:?}");
+    }
+    until(at, &["approach", "run"]);
+    run.kill().unwrap();
+    run.wait().unwrap();
+}
+
 /// A machine that was suspended, or a program that a debugger holds: the device stops the arm and lets go of its host,
 /// which must not wait for the end of the move.
 #[test]

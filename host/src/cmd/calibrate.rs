@@ -40,6 +40,17 @@ pub enum Action {
     Payload(payload::Payload),
 }
 
+impl Action {
+    /// True if nothing is changed or moved: it may be asked for beside a host that commands the arm.
+    fn only_looks(&self) -> bool {
+        match self {
+            Self::Show => true,
+            Self::Payload(payload) => payload.only_looks(),
+            Self::Home(_) | Self::Forget | Self::Gravity(_) | Self::Friction(_) => false,
+        }
+    }
+}
+
 /// The home to store.
 #[derive(Debug, Clone, Args)]
 #[command(group = ArgGroup::new("angles").required(true))]
@@ -72,7 +83,10 @@ const DOING: &str = "calibrate";
 /// # Errors
 /// The device cannot be reached, the arm is not zeroed or moves, or the device refuses the home.
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
-    let mut client = connection::open(global, DOING, |_| {})?;
+    let mut client = match command.action.only_looks() {
+        true => connection::observe(global, DOING)?,
+        false => connection::open(global, DOING, |_| {})?,
+    };
     client.require(Capability::Arm).map_err(|error| error.into_failure(DOING))?;
     match &command.action {
         Action::Gravity(command) => weigh::run(command, &mut client, global),

@@ -38,6 +38,13 @@ pub struct Payload {
     pub report: Option<PathBuf>,
 }
 
+impl Payload {
+    /// True if the declaration is shown, and nothing else happens.
+    pub(super) fn only_looks(&self) -> bool {
+        self.carries.is_none() && !self.measure
+    }
+}
+
 /// Payload of an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Carries {
