@@ -100,6 +100,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::guard::disagreement::torques_of", "a motor stands still, or a push"),
     ("control::cycle::hand::HandDrive<R>::stop_driving", "the hand is not driven: a few dozen instructions at first"),
     ("control::cycle::hand::HandDrive<R>::grasp", "the memory is full; three fingers, a dozen or two instructions"),
+    ("control::plan::inertia", "the memory is full; three axes, a dozen instructions each"),
     ("control::plan::lift::Lift<R>::raise", "in a grip: a few dozen instructions"),
     ("control::law::settling", "the memory is full; one joint in a cycle, a few dozen instructions"),
     ("control::law::hand::bound_closing", "the memory is full; three fingers, a few dozen instructions"),

@@ -68,7 +68,7 @@ fn each_sensor_bends_its_own_row_and_the_spread_and_the_posture_have_none() {
     for sensor in 0..SENSORS {
         let mut error = [0.0; SENSORS];
         error[sensor] = 0.5;
-        let (rows, posture) = coupled(&primitive.coupling(&rollout, &error, None).unwrap());
+        let (rows, posture) = coupled(&primitive.coupling(&rollout, &error).unwrap());
         let row = if sensor < 6 { sensor } else { sensor + 1 };
         for (index, zeta) in rows.into_iter().enumerate() {
             assert_eq!(zeta, if index == row { 0.5 * gains[row] } else { 0.0 }, "sensor {sensor}, row {index}");
@@ -76,7 +76,7 @@ fn each_sensor_bends_its_own_row_and_the_spread_and_the_posture_have_none() {
         assert_eq!(posture, [0.0; 7]);
     }
     // A blow is cut to the limit of each group.
-    let (rows, _) = coupled(&primitive.coupling(&rollout, &[1e4; SENSORS], None).unwrap());
+    let (rows, _) = coupled(&primitive.coupling(&rollout, &[1e4; SENSORS]).unwrap());
     let length = |rows: &[f64]| rows.iter().map(|x| x * x).sum::<f64>().sqrt();
     assert!((length(&rows[..3]) / (K[0] * 0.3) - 1.0).abs() < 1e-12);
     assert!((length(&rows[3..6]) / (K[1] * 0.25_f64.sin()) - 1.0).abs() < 1e-12);
@@ -90,7 +90,7 @@ fn the_coupling_fades_where_the_speed_is_not_that_of_the_recording() {
     for (speed, trust) in [(1.0, 1.0), (1.0 / 1.05, 1.0), (1.0 / 1.3, 0.5), (1.0 / 1.4, 0.25), (0.5, 0.0), (0.0, 0.0)] {
         rollout.set_speed(primitive.movement(), speed).unwrap();
         assert!((primitive.trust(&rollout) - trust).abs() < 1e-9, "speed {speed}");
-        let (rows, _) = coupled(&primitive.coupling(&rollout, &[1.0; SENSORS], None).unwrap());
+        let (rows, _) = coupled(&primitive.coupling(&rollout, &[1.0; SENSORS]).unwrap());
         assert!((rows[0] - 6.0 * trust).abs() < 1e-9, "speed {speed}: {rows:?}");
     }
 }
@@ -106,11 +106,11 @@ fn without_gains_or_expectation_a_primitive_runs_open_loop() {
         } else {
             poorer.set_feedback(None);
         }
-        assert_eq!(poorer.coupling(&rollout, &[1.0; SENSORS], None).unwrap(), Coupling::NONE);
+        assert_eq!(poorer.coupling(&rollout, &[1.0; SENSORS]).unwrap(), Coupling::NONE);
         assert!(!poorer.trust(&rollout).is_nan());
     }
     let other = Primitive::new(&tables(&[0.1; ROWS * 30], 0.5)).unwrap();
-    assert_eq!(other.coupling(&rollout, &[1.0; SENSORS], None), Err(RolloutError::OtherPrimitive));
+    assert_eq!(other.coupling(&rollout, &[1.0; SENSORS]), Err(RolloutError::OtherPrimitive));
 }
 
 #[test]

@@ -368,6 +368,12 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Primitive<T, D, 
         Coupling { poses: core::array::from_fn(pose), points: core::array::from_fn(point) }
     }
 
+    /// Stiffness K of the position rows of each pose.
+    #[must_use]
+    pub fn position_stiffness(&self) -> [T; P] {
+        core::array::from_fn(|n| self.systems.poses[n][0].stiffness())
+    }
+
     /// Start and goal orientation of a pose, and how they are meant.
     pub(crate) fn taught(&self, pose: usize) -> Option<Taught<T>> {
         Some(Taught {

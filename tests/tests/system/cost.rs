@@ -14,7 +14,7 @@ use system_tests::{Arm, command, expect, ready, simulation};
 
 /// Instructions of a control cycle at its worst: a little more than is measured (29 695, of which some 600 watch for
 /// joints that swing). `cargo xtask budget` allows 30 000.
-const BOUND: u32 = 29_700;
+const BOUND: u32 = 29_900;
 
 /// Instructions per tick of the image's clock under `-icount shift=3`.
 const PER_TICK: u32 = 5;
@@ -118,7 +118,7 @@ impl Costs {
 /// The change that makes it fail: `MotionObserver::postpone` does nothing, so that a run may begin in the cycle in
 /// which the mass matrix is renewed.
 #[test]
-fn no_order_and_no_stop_makes_a_control_cycle_longer_than_29_700_instructions() {
+fn no_order_and_no_stop_makes_a_control_cycle_longer_than_29_900_instructions() {
     let mut costs = Costs { arm: ready("sim:seed=51"), worst: BTreeMap::new() };
     prepare(&mut costs.arm, largest());
     costs.go_to_the_start();

@@ -4,8 +4,8 @@
 //! holds or approaches, the desired posture is therefore shifted towards the error, joint by joint, until the joint
 //! moves:
 //!
-//! * at a rate that grows with the error, within bounds: friction is overcome in a second or two however small the
-//!   error, and the joint then slides at that rate, at J7 at 0.03 to 0.12 rad/s;
+//! * at a constant rate while the joint stands, the whole clamp in [`RISE`], so that friction is overcome in the same
+//!   time however small the error; once it moves, at a rate that falls with the error, at most 0.08 rad/s (J7);
 //! * from an error of three quarters of [`TOLERANCE`] on, until it is less than half of it; in between nothing changes,
 //!   which is why it does not hunt;
 //! * within a clamp worth 1.5 times the friction of the model: an obstacle feels that much more, and no more with time.
@@ -18,16 +18,16 @@ use crate::units::{JOINTS, JointPositions, Vector7};
 /// Accuracy of a held posture under the friction of the model, 30 % more or less (rad).
 pub const TOLERANCE: [f64; JOINTS] = [0.004, 0.004, 0.004, 0.004, 0.008, 0.008, 0.008];
 
-/// Time from zero to the clamp (s), at the rate of an error of one and a half times the tolerance.
+/// Time from zero to the clamp (s).
 pub const RISE: f64 = 0.8;
 
 /// Fractions of the tolerance beyond which a joint begins to be shifted, and below which it is left alone again.
 const BAND: (f64, f64) = (0.75, 0.5);
 
-/// Least and largest rate of a joint that moves, in parts of the one that reaches the clamp in [`RISE`]. In between it is
-/// in proportion to the error beyond the band: with the whole rate at the edge of the band J7, J5 and J3 swing at 3 to 4
-/// Hz at half the stiffness, and at the nominal one each edge is a jerk of 0.07 rad/s.
-const RATES: (f64, f64) = (0.3, 1.0);
+/// Least part of that rate for a joint that moves. It is all of it from one and a half times the tolerance on, and in
+/// between in proportion to the error: with all of it at the edge of the band J7, J5 and J3 swing at 3 to 4 Hz at half
+/// the stiffness, and at the nominal one each edge is a jerk of 0.07 rad/s.
+const LEAST_RATE: f64 = 0.3;
 
 /// Speed below which a joint stands (rad/s): friction holds it, and it swings with nothing.
 const STANDS: f64 = 0.004;
@@ -82,8 +82,8 @@ impl<R: Real> PostureIntegral<R> {
             if *seeking && advancing < *clamp * R::constant(1.0 / RISE) {
                 let beyond = magnitude * R::constant(1.0 / tolerance) - R::constant(BAND.1);
                 let stands = advancing < R::constant(STANDS) && advancing > R::constant(-STANDS);
-                let least = R::constant(if stands { RATES.1 } else { RATES.0 });
-                let rate = at_least(at_most(beyond, R::constant(RATES.1)), least);
+                let least = R::constant(if stands { 1.0 } else { LEAST_RATE });
+                let rate = at_least(at_most(beyond, R::constant(1.0)), least);
                 *shift = within(*shift + sign * *clamp * rate * R::constant(PERIOD / RISE), *clamp);
             }
         }

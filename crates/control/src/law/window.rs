@@ -68,9 +68,9 @@ impl<R: Real, const D: usize, const CAPACITY: usize> Window<R, D, CAPACITY> {
     pub fn before(&self, periods: usize) -> Option<&SVector<R, D>> {
         let back = periods + 1;
         let at = match self.next.checked_sub(back) {
-            Some(at) => at,
-            None if self.full => (self.next + self.length).checked_sub(back)?,
-            None => return None,
+            Some(at) if back <= self.length => at,
+            None if self.full && back <= self.length => (self.next + self.length).checked_sub(back)?,
+            _ => return None,
         };
         self.errors.get(at)
     }
@@ -105,6 +105,21 @@ mod tests {
                 // From the definition.
                 let sum: f64 = errors[(last + 1).saturating_sub(length)..=last].iter().sum();
                 assert_eq!(window.sum()[0], sum, "error {last} of a window of {length} after {before}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_error_of_some_periods_ago_is_told_as_long_as_the_window_holds_it() {
+        let Ok(mut window) = Box::new_uninit().write_init(Window::<f64, 1, 8>::init(8));
+        (0..20).for_each(|_| window.push(&Vector1::new(100.0)));
+        window.restart(5);
+        for last in 0..13u32 {
+            window.push(&Vector1::new(f64::from(last)));
+            for ago in 0..7u32 {
+                // From the definition; what is from before the window was emptied is in no window.
+                let wanted = (ago <= last && ago < 5).then(|| f64::from(last - ago));
+                assert_eq!(window.before(ago as usize).map(|error| error[0]), wanted, "{ago} before error {last}");
             }
         }
     }

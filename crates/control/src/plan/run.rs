@@ -159,7 +159,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             coupling: Coupling::NONE,
             deviation: None,
             smoothed: SmoothedWrench::new(),
-            inertia: Inertia::new(),
+            inertia: Inertia::none(),
             grasps: false,
             watch: Watch::new(),
             kept: FADE,
@@ -173,6 +173,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             speed: options.speed,
             slow: false,
         };
+        run.inertia.take_on(primitive);
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
         run.rollout.set_speed_slew(None).map_err(reason)?;
         set_speed(&mut run.rollout, primitive, options.speed)?;
@@ -315,8 +316,10 @@ impl<R: Real, const N: usize> Run<R, N> {
             if !self.options.finger_feedback {
                 seen.gauges = [R::constant(0.0); 3];
             }
-            let inertia = (self.options.compliant || grasps).then_some(&mut self.inertia);
-            self.coupling = primitive.coupling(&self.rollout, &seen.error(), inertia)?;
+            if self.options.compliant || grasps {
+                self.inertia.carry(&mut seen.wrench.force, primitive.movement().rate() * self.rollout.speed());
+            }
+            self.coupling = primitive.coupling(&self.rollout, &seen.error())?;
         }
         // A plan that springs back tips what has just been grasped, and one that goes on giving way pulls at it.
         self.lead_goal(primitive);

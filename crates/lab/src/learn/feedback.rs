@@ -6,6 +6,7 @@
 //! N for 25 cm) and a virtual mass of at most 2 kg, and `K`, `K1` grow with the square of the duration.
 
 use control::plan::bounds::GAIN;
+use control::plan::inertia::MASS;
 use dmp::Gain;
 use serde::Serialize;
 
@@ -107,7 +108,7 @@ pub struct RowFeedback {
     pub k1: f64,
     /// Force (N) or torque (N m) that displaces the plan as far as it may go.
     pub load_at_limit: f64,
-    /// Virtual mass (kg) or inertia (kg m^2), `tau^2/K1`.
+    /// Virtual mass (kg) or inertia (kg m^2), `tau^2/K1`; no plan is lighter than 2 kg for what is fast.
     pub inertia: f64,
     /// Damping (N s/m or N m s/rad), `D tau/K1`.
     pub damping: f64,
@@ -157,7 +158,7 @@ impl FeedbackReport {
                 row,
                 k1,
                 load_at_limit: stiffness * limit / k1,
-                inertia: tau * tau / k1,
+                inertia: f64::max(tau * tau / k1, if index < 3 { MASS } else { 0.0 }),
                 damping: damping * tau / k1,
             })
         });

@@ -15,7 +15,6 @@ pub use rows::{
 pub use crate::guard::watch::{STATISTICS_CAPACITY, STATISTICS_CHANNELS, SensorStatistics};
 pub use crate::sense::deviation::SENSORS;
 
-use crate::plan::inertia::Inertia;
 use dmp::{CouplingGains, PhaseTable, PoseCoupling, PrimitiveError, RolloutError, Scalar, TableError};
 
 /// Rows with feedback: position 3, orientation 3, hand 4 (the spread has no gauge).
@@ -38,7 +37,7 @@ pub type ExpectedWrench<T> = dmp::ExpectedSensors<T, SENSORS, EXPECTED_CAPACITY>
 pub struct Feedback<T> {
     gains: CouplingGains<T, COUPLED_ROWS, SENSORS, GAIN_CAPACITY>,
     limits: Limits<T>,
-    /// Largest `K1 K2` of a position row over the phase.
+    /// Largest `K1` of a position row over the phase.
     largest: T,
 }
 
@@ -70,33 +69,28 @@ impl<T: Scalar> Feedback<T> {
         &self.limits
     }
 
+    /// Largest `K1` of a position row over the phase.
+    pub(crate) fn largest(&self) -> T {
+        self.largest
+    }
+
     /// `zeta` at progress `u` for the error `F - F_expected`, within the limits. Forces are in the world frame and
     /// torques in the body frame at the controlled point: `J^T` only sorts them.
-    fn coupling<const N: usize>(
-        &self,
-        movement: &Movement<T, N>,
-        u: T,
-        error: &[T; SENSORS],
-        carried: impl FnOnce([T; 3]) -> [T; 3],
-    ) -> Coupling<T> {
+    fn coupling<const N: usize>(&self, movement: &Movement<T, N>, u: T, error: &[T; SENSORS]) -> Coupling<T> {
         let [px, py, pz, rx, ry, rz, hand @ ..] = self.gains.zeta(u, error, |weighted| {
             let [fx, fy, fz, tx, ty, tz, f1, f2, f3] = *weighted;
             [fx, fy, fz, tx, ty, tz, T::ZERO, f1, f2, f3]
         });
-        let pose = PoseCoupling { position: carried([px, py, pz]), orientation: [rx, ry, rz] };
+        let pose = PoseCoupling { position: [px, py, pz], orientation: [rx, ry, rz] };
         let zeta = Coupling { poses: [pose], points: points([T::ZERO; POSTURE_ROWS], hand) };
         movement.limited_coupling(&zeta, &self.limits)
     }
 }
 
-/// Largest `K1 K2` of a position row over the phase. Both are straight lines between their samples.
+/// Largest `K1` of a position row over the phase: straight lines between the samples.
 fn largest<T: Scalar>(gains: &CouplingGains<T, COUPLED_ROWS, SENSORS, GAIN_CAPACITY>) -> T {
-    fn most<T: Scalar, const COLUMNS: usize>(samples: &[[T; COLUMNS]], column: usize) -> T {
-        let values = samples.iter().filter_map(|sample| sample.get(column));
-        values.fold(T::ZERO, |most, value| if *value > most { *value } else { most })
-    }
-    let of = |row| most(gains.sensitivity().samples(), row) * most(gains.weight().samples(), row);
-    (0..3).map(of).fold(T::ZERO, |most, gain| if gain > most { gain } else { most })
+    let rows = gains.sensitivity().samples().iter().flat_map(|sample| sample.iter().take(3));
+    rows.fold(T::ZERO, |most, k1| if *k1 > most { *k1 } else { most })
 }
 
 /// A movement with the memory of its sensors; `N` = kernel capacity.
@@ -188,13 +182,11 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         match feedback {
             Some(feedback) => {
                 self.feedback.gains.copy_from(&feedback.gains);
-                self.feedback.limits = feedback.limits;
-                self.feedback.largest = feedback.largest;
+                (self.feedback.limits, self.feedback.largest) = (feedback.limits, feedback.largest);
             }
             None => {
                 self.feedback.gains.clear();
-                self.feedback.limits = Limits::NONE;
-                self.feedback.largest = T::ZERO;
+                (self.feedback.limits, self.feedback.largest) = (Limits::NONE, T::ZERO);
             }
         }
     }
@@ -229,8 +221,7 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
         self.set_feedback(None);
         limits.check()?;
         self.feedback.gains.assign(sensitivity, weight)?;
-        self.feedback.limits = limits;
-        self.feedback.largest = largest(&self.feedback.gains);
+        (self.feedback.limits, self.feedback.largest) = (limits, largest(&self.feedback.gains));
         Ok(())
     }
 
@@ -270,31 +261,16 @@ impl<T: Scalar, const N: usize> Primitive<T, N> {
     }
 
     /// `zeta` of Eq (8) for this tick from the error `F - F_expected` (environment on the robot); none if the primitive
-    /// has no gains or no expectation. With an `inertia` the plan is no lighter than that.
+    /// has no gains or no expectation.
     ///
     /// # Errors
     /// [`RolloutError::OtherPrimitive`].
-    pub fn coupling(
-        &self,
-        rollout: &Rollout<T, N>,
-        error: &[T; SENSORS],
-        inertia: Option<&mut Inertia<T>>,
-    ) -> Result<Coupling<T>, RolloutError> {
+    pub fn coupling(&self, rollout: &Rollout<T, N>, error: &[T; SENSORS]) -> Result<Coupling<T>, RolloutError> {
         rollout.check(&self.movement)?;
         let (Some(feedback), Some(_)) = (self.feedback(), self.expected()) else {
             return Ok(Coupling::NONE);
         };
         let trust = self.trust(rollout);
-        let rate = self.movement.rate() * rollout.speed();
-        let carried = |zeta| match &inertia {
-            Some(inertia) => inertia.carried(zeta, feedback.largest, rate),
-            None => zeta,
-        };
-        let error = error.map(|error| error * trust);
-        let coupling = feedback.coupling(&self.movement, rollout.progress(), &error, carried);
-        if let Some(inertia) = inertia {
-            inertia.follow(&coupling.poses[0].position);
-        }
-        Ok(coupling)
+        Ok(feedback.coupling(&self.movement, rollout.progress(), &error.map(|error| error * trust)))
     }
 }
