@@ -69,7 +69,7 @@ impl<R: Real> ForceController<R> {
         -(error * proportional + self.window.sum() * (integral * period))
     }
 
-    /// The same, whose proportional part takes the mean of the error and of the one [`AGO`].
+    /// The same, whose proportional part takes the mean of the error and of the one 10 ms ago.
     pub fn calm_command(
         &mut self,
         error: &Vector6<R>,
