@@ -195,8 +195,8 @@ fn every_loop_that_is_not_listed_is_stable_without_friction_and_every_listed_one
     assert!(drawn().is_some() || wrong.is_empty(), "not as listed:\n{}", wrong.join("\n"));
 }
 
-/// Seeds of the poses on which no gain was chosen; the rates of the posture's integral were, among others. What fails in
-/// poses that were looked at once is in decision 0149.
+/// Seeds of the poses on which no gain was chosen; the rates of the posture's integral were, among others. What fails
+/// in poses that were looked at once is in decision 0149.
 const UNSEEN: [u64; 2] = [21, 22];
 
 /// Largest part of the pushes that may bring the arm to a limit of its joints, or to a singular posture, before any
@@ -207,8 +207,8 @@ const UNREACHED: f64 = 0.1;
 const MARGINS: [&str; 7] =
     ["nominal", "gain x1.4", "gain x2", "gain x0.5", "1 cycle late", "cables x0.8", "cables x1.2"];
 
-/// Every law that the host asks for, in poses that nobody chose gains on. At half the gain a run has half of the gravity
-/// torque: there it is left out.
+/// Every law that the host asks for, in poses that nobody chose gains on. At half the gain a run has half of the
+/// gravity torque: there it is left out.
 ///
 /// The changes that make it fail: P of Eq (12) without what is 10 ms old; a plan that bends without a mass; the posture
 /// integral with its whole rate at the edge of its band.
