@@ -227,6 +227,7 @@ impl HostError {
             Self::Address(_) => ErrorCode::AddressInvalid,
             Self::Transport(TransportError::NotFound { .. }) => ErrorCode::DeviceNotFound,
             Self::Transport(TransportError::Permission { .. }) => ErrorCode::PermissionDenied,
+            Self::Transport(TransportError::Busy { .. }) => ErrorCode::PortInUse,
             Self::Incompatible { what: Refusal::Schema, .. } => ErrorCode::LinkSchema,
             Self::Incompatible { what: Refusal::Model, .. } => ErrorCode::RobotModel,
             Self::Incompatible { .. } => ErrorCode::LinkVersion,

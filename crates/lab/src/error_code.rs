@@ -191,8 +191,7 @@ error_codes! {
         "`tactus experiment --help` lists them; a file of your own ends in `.toml`";
     DeviceNotFound = 301: "there is no such device", "cable, power, or a misspelt port",
         "check cable and name of the device; for a simulated arm use `--device sim:`";
-    PermissionDenied = 302: "no permission to use the device",
-        "the user is not in the group of serial ports, or another program has the port",
+    PermissionDenied = 302: "no permission to use the device", "the user is not in the group of serial ports",
         "let your user open serial ports: `sudo usermod -aG dialout $USER`, then log in again";
     NoCanInterface = 303: "there is no such CAN interface", "the adapter is not plugged in, or has another name",
         "plug the CAN adapter in and load its driver; `ip -details link show type can` lists what is there";
@@ -202,6 +201,9 @@ error_codes! {
         "switch it on with the two commands that are printed with its name";
     NoSocketCan = 306: "this system has no SocketCAN", "the kernel's modules are not loaded, or this is not Linux",
         "load the kernel's CAN modules: `sudo modprobe can_raw`; on other systems use the serial line";
+    PortInUse = 307: "another program uses the serial port", "a run or a monitor in another terminal, or a terminal program",
+        "a serial port is for one program: Ctrl-C in the other terminal ends it, and brings an arm that it moves to \
+         rest; `lsof PORT` names it";
     WithoutMujoco = 310: "this tactus was built without the MuJoCo world", "`cargo build` without the feature",
         "`cargo xtask build`, or `--device sil:world=simple`";
     NoQemuImage = 311: "there is no firmware image for QEMU", "it was not built", "`cargo xtask build`";

@@ -63,6 +63,12 @@ pub enum TransportError {
         /// The system's reason.
         cause: std::io::Error,
     },
+    /// Another program has the serial port, which is for one alone.
+    #[error("{address} is in use by another program")]
+    Busy {
+        /// The address.
+        address: String,
+    },
     /// The other end closed the connection, or the cable was pulled.
     #[error("the connection is closed")]
     Closed,

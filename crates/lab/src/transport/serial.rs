@@ -18,13 +18,29 @@ impl SerialTransport {
     /// Opens `path` at `baud`.
     ///
     /// # Errors
-    /// [`TransportError::NotFound`] or [`TransportError::Permission`], told apart because their remedies differ.
+    /// [`TransportError::NotFound`], [`TransportError::Permission`] or [`TransportError::Busy`], told apart because
+    /// their remedies differ.
     pub fn open(path: &str, baud: u32) -> Result<Self, TransportError> {
         let port = serialport::new(path, baud)
             .timeout(Duration::from_millis(10))
             .open()
-            .map_err(|error| TransportError::opening(&format!("serial:{path}"), std::io::Error::from(error)))?;
+            .map_err(|error| unopened(path, error))?;
         Ok(Self { port, opened: Instant::now() })
+    }
+}
+
+/// Why a port could not be opened.
+fn unopened(path: &str, error: serialport::Error) -> TransportError {
+    use serialport::ErrorKind;
+    let address = format!("serial:{path}");
+    let is_there = std::path::Path::new(path).exists();
+    match error.kind {
+        // What is there and has "no device" could not be locked.
+        ErrorKind::NoDevice if is_there => TransportError::Busy { address },
+        ErrorKind::Unknown if is_there => {
+            TransportError::opening(&address, std::io::Error::other(format!("it is no serial port ({error})")))
+        }
+        _ => TransportError::opening(&address, error.into()),
     }
 }
 

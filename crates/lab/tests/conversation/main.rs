@@ -2,6 +2,8 @@
 
 mod fixture;
 mod secret;
+#[cfg(unix)]
+mod serial;
 
 use std::cell::RefCell;
 use std::io::Write as _;
