@@ -114,6 +114,6 @@ fn a_serial_cable_that_is_pulled_out_closes_the_connection() {
     let mut board = Board::new();
     let mut client = board.open();
     board.pull();
-    let error = client.status().err().expect("nobody is there");
+    let error = client.status().expect_err("nobody is there");
     assert_eq!(error.code().to_string(), "E701", "{error}");
 }
