@@ -70,7 +70,7 @@ const BRAKING: u16 = 20;
 /// bounces off it a few times.
 const BRAKING_FULL: u16 = BRAKING * periods(0.25);
 
-/// What is left of that after the first periods of a touch, until two thirds are used up: what is met is no swing, and
+/// Braking that is left after the first periods of a touch, until two thirds are used up: an obstacle is no swing, and
 /// the plan gives way to it with no more mass than Eq (8) has. With it a hand at 6 cm/s topples what stands there.
 const MEETING: core::ops::Range<u16> = BRAKING_FULL / 3..BRAKING_FULL - 2 * BRAKING;
 

@@ -373,8 +373,8 @@ fn a_plan_that_meets_something_does_not_run_on_into_it() {
     assert!(way < 4e-3, "{way}");
 }
 
-/// What is met in full motion is no swing of the hand, and the plan goes back from it without the mass that keeps those
-/// from making more of themselves: at 6 cm/s a flashlight toppled.
+/// An obstacle that is met in full motion is no swing of the hand, and the plan goes back from it without the mass that
+/// keeps swings from making more of themselves: at 6 cm/s a flashlight toppled.
 ///
 /// The change that makes it fail: that mass is there in a touch as well. 2.1 mm then, 7.0 without it.
 #[test]
