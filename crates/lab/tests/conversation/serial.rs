@@ -23,7 +23,8 @@ struct Board {
 
 impl Board {
     fn new() -> Self {
-        let (mut far, near) = TTYPort::pair().expect("a pseudo-terminal");
+        let (mut far, near) =
+            TTYPort::pair().expect("a pseudo-terminal; if there is none: mount -t devpts devpts /dev/pts");
         let path = near.name().expect("has a name");
         // Without a user at the near end the far one is told that the line is gone; this one leaves it to others.
         let kept = std::fs::File::open(&path).expect("opens");
