@@ -30,6 +30,7 @@ pub(crate) fn run() -> Result<()> {
         let file = shell::target_dir().join("package").join(format!("{name}-{version}.crate"));
         shell::run(std::process::Command::new("tar").arg("-xzf").arg(&file).arg("-C").arg(&folder))?;
         let package = folder.join(format!("{name}-{version}"));
+        depend_on(&package, &folder.join(format!("user-of-{name}")))?;
         for licence in ["LICENSE-APACHE", "LICENSE-MIT"] {
             ensure!(package.join(licence).is_file(), "the package {name} lacks {licence}");
         }
@@ -48,6 +49,18 @@ pub(crate) fn run() -> Result<()> {
     }
     fs::remove_dir_all(&folder)?;
     Ok(())
+}
+
+/// Checks a package of somebody who copied the dependency out of this one's README, beside a clone of the repository.
+fn depend_on(package: &Path, user: &Path) -> Result<()> {
+    let readme = fs::read_to_string(package.join("README.md")).context("a package without a README")?;
+    let block = readme.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next());
+    let block = block.context("a README that does not say how to depend on its package")?;
+    fs::create_dir_all(user.join("src"))?;
+    std::os::unix::fs::symlink(shell::root(), user.join("tactus"))?;
+    fs::write(user.join("Cargo.toml"), format!("[package]\nname = \"user\"\nedition = \"2024\"\n\n{block}"))?;
+    fs::write(user.join("src/lib.rs"), "#![no_std]\n")?;
+    shell::run(shell::cargo().current_dir(user).env("CARGO_TARGET_DIR", user.join("target")).args(["check", "--quiet"]))
 }
 
 /// Names of a package's examples.
