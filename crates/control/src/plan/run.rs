@@ -70,10 +70,6 @@ const BRAKING: u16 = 20;
 /// bounces off it a few times.
 const BRAKING_FULL: u16 = BRAKING * periods(0.25);
 
-/// Braking that is left after the first periods of a touch, until two thirds are used up: an obstacle is no swing, and
-/// the plan gives way to it with no more mass than Eq (8) has. With it a hand at 6 cm/s topples what stands there.
-const MEETING: core::ops::Range<u16> = BRAKING_FULL / 3..BRAKING_FULL - 2 * BRAKING;
-
 /// Age of the sensor values of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Senses {
@@ -320,7 +316,7 @@ impl<R: Real, const N: usize> Run<R, N> {
             if !self.options.finger_feedback {
                 seen.gauges = [R::constant(0.0); 3];
             }
-            if (self.options.compliant || grasps) && !MEETING.contains(&self.braking) {
+            if self.options.compliant || grasps {
                 self.inertia.carry(&mut seen.wrench.force, primitive.movement().rate() * self.rollout.speed());
             }
             self.coupling = primitive.coupling(&self.rollout, &seen.error())?;
