@@ -110,7 +110,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::cycle::Cycle<R,_>::reset", "after a fault of the bus"),
     ("control::cycle::Cycle<R,_>::not_sent", "the bus has refused a frame"),
     ("device::controller::orders", "once, when a person commands"),
-    ("device::controller::DeviceController::restart", "after a fault of the bus"),
+    ("device::controller::anew", "after a fault of the bus"),
     ("device::startup", "a person zeroes the arm again"),
     ("device::hand", "the hand is initialised or has failed"),
     ("firmware::board::panic_stop", "the end"),

@@ -12,6 +12,7 @@
 //! No torque but zero leaves before the start-up is over, a person has activated the arm, and a person has commanded
 //! it: the frames of a cycle come from [`control::Actuation`] or are zero.
 
+mod anew;
 mod brakes;
 mod lateness;
 mod orders;
@@ -248,48 +249,9 @@ impl DeviceController {
         let mut outlet = SlotOutlet { io, counters: &mut self.counters, pacer: &mut self.pacer, now_us, cyclic: false };
         if self.startup.advance(&mut outlet) {
             self.begin_cycles();
+        } else if matches!(self.startup.stage(), Stage::Enumerating | Stage::Blocked) {
+            self.suspend_hand();
         }
-    }
-
-    /// The start-up is over: the next request slot begins the cyclic loop.
-    fn begin_cycles(&mut self) {
-        let (Some(calibration), Some(safety)) = (self.startup.calibration(), self.startup.safety_properties()) else {
-            return;
-        };
-        self.cycle.reset();
-        // After a reset no state has torque, and only torque makes the cycle refuse.
-        if self.cycle.calibrate(*calibration).is_err() {
-            return;
-        }
-        if !self.startup.is_zeroed() {
-            self.cycle.lose_zero();
-        }
-        self.phase = BusPhase::Cyclic(BackgroundPoll::new(safety));
-        self.round = Round::new(self.startup.has_sensor());
-        match self.startup.take_hand() {
-            Some(found) => self.hand.begin(found),
-            None => self.hand.resume(),
-        }
-        if self.startup.take_tare() {
-            self.cycle.forget_tare();
-        }
-        (self.fault, self.last_cycles, self.fresh_safety) = (None, None, None);
-        self.refused = 0;
-        self.lateness = Lateness::default();
-        self.brakes = Brakes::default();
-    }
-
-    /// Leaves the cyclic loop.
-    #[cold]
-    #[inline(never)]
-    fn restart(&mut self, now_us: u64) {
-        Counters::count(&mut self.counters.restarts);
-        self.phase = BusPhase::StartUp;
-        self.startup.restart(now_us, self.cycle.last_counts());
-        self.cycle.reset();
-        self.hand.suspend();
-        self.late = None;
-        self.hand_temperatures = [None; 4];
     }
 
     fn request(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {

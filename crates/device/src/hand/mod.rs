@@ -67,9 +67,9 @@ impl Hand {
         }
     }
 
-    /// The start-up is over and has found this. One that a failed zeroing has begun has suspended no hand.
+    /// The start-up is over and has found this.
     pub(crate) fn begin(&mut self, found: Found) {
-        let (told, was_ready) = (self.told, self.was_ready || self.stage == HandStage::Ready);
+        let (told, was_ready) = (self.told, self.was_ready);
         *self = Hand { told, ..Hand::new() };
         match found {
             Found::Nothing(cause) => self.cause = cause,
@@ -87,7 +87,8 @@ impl Hand {
 
     /// The bus is started anew: nothing is known until the start-up is over.
     pub(crate) fn suspend(&mut self) {
-        *self = Hand { told: self.told, was_ready: self.stage == HandStage::Ready, ..Hand::new() };
+        let was_ready = self.was_ready || self.stage == HandStage::Ready;
+        *self = Hand { told: self.told, was_ready, ..Hand::new() };
     }
 
     /// Its stage.

@@ -171,6 +171,8 @@ pub(crate) struct Startup {
     /// The same once the arm has been zeroed there.
     zeroed_at: Option<[f32; 7]>,
     zero_request: ZeroRequest,
+    /// It was given in the cyclic loop, which goes on if it comes to nothing, zeroed or not.
+    from_loop: bool,
     error: Option<StartupError>,
 }
 
@@ -213,6 +215,7 @@ impl Startup {
             home: [0.0; 7],
             zeroed_at: None,
             zero_request: ZeroRequest::None,
+            from_loop: false,
             error: None,
         }
     }

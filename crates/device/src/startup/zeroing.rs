@@ -38,6 +38,7 @@ impl Startup {
     #[inline(never)]
     pub(crate) fn zero_again(&mut self, home: &[f32; 7], now_us: u64, last: Option<[(Counts, u8); 7]>) {
         self.zero(home);
+        self.from_loop = true;
         self.continuity = Some(Continuity::since(now_us, last));
     }
 
@@ -106,12 +107,16 @@ impl Startup {
         Ok(self.refuse_zero(outlet))
     }
 
-    /// The arm is not idle, or it moves. Back to where the command came in: toward the loop if the arm is zeroed, else
-    /// to the person.
+    /// The arm is not idle, or it moves. Back to where the command came in: to the loop, or to the person.
     pub(super) fn refuse_zero(&mut self, outlet: &mut impl Outlet) -> Next {
         self.zero_request = ZeroRequest::Answered(Err(Refusal::ZeroNeedsIdle));
         let next_us = outlet.now_us() + POLL_US;
-        Next::Go(if self.zeroed { Step::AskZero } else { Step::AwaitZero { next_us } })
+        Next::Go(match (self.zeroed, self.from_loop) {
+            (true, _) => Step::AskZero,
+            // A hand would be told to be ready, and nobody would ask it.
+            (false, true) => Step::Tare,
+            (false, false) => Step::AwaitZero { next_us },
+        })
     }
 
     pub(super) fn await_zero(&mut self, next_us: u64, outlet: &mut impl Outlet) -> Result<Next, StartupError> {

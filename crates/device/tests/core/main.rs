@@ -8,6 +8,7 @@ mod cycles;
 mod digit;
 mod double;
 mod hand;
+mod hand_anew;
 mod late;
 mod startup;
 mod zero;
