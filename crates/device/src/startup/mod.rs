@@ -168,7 +168,7 @@ pub(crate) struct Startup {
     declared: Option<Payload>,
     /// The posture that `targets` are the counts of (rad).
     home: [f32; 7],
-    /// The same once the arm has been zeroed there.
+    /// The same once the arm has been zeroed there, for as long as that zero is not lost.
     zeroed_at: Option<[f32; 7]>,
     zero_request: ZeroRequest,
     /// It was given in the cyclic loop, which goes on if it comes to nothing, zeroed or not.
@@ -231,6 +231,7 @@ impl Startup {
             tared_anew: self.tared_anew,
             angles: self.angles,
             declared: self.declared,
+            zeroed_at: self.zeroed_at,
             // Given in this very slot, it is told behind it.
             zero_request: self.zero_request,
             stopping: Some(Stopping::default()),
@@ -328,9 +329,9 @@ impl Startup {
         self.zeroed
     }
 
-    /// The posture (rad) at which it was zeroed; `None` if that was before this start-up.
+    /// The posture (rad) at which it was zeroed; `None` if the device was not there.
     pub(crate) fn zeroed_at(&self) -> Option<[f32; 7]> {
-        self.zeroed_at
+        self.zeroed_at.filter(|_| self.zeroed)
     }
 
     /// The scales of this arm, once read.
@@ -488,9 +489,7 @@ impl Startup {
             Step::Read { joint, item } => self.read(joint, item, outlet),
             Step::ReadHand { digit, item } => Ok(self.read_digit(digit, item, outlet)),
             Step::AskZero => self.ask_zero(outlet),
-            Step::RevokeZero { word: REVOCATIONS.. } => {
-                Ok(Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US }))
-            }
+            Step::RevokeZero { word: REVOCATIONS.. } => Ok(self.await_next_zero(outlet)),
             Step::RevokeZero { word } => {
                 let frame = set(Node::SAFETY_MODULE, self.safety()?.zero, 0);
                 Ok(after(outlet.send(frame), Step::RevokeZero { word: word + 1 }))
@@ -547,26 +546,26 @@ impl Startup {
         let (continuity, tared, angles, declared) = (self.continuity, self.tared, self.angles, self.declared);
         // The answer to a person who wanted to zero in this very slot is told behind it.
         let (tared_anew, stopping, zero_request) = (self.tared_anew, self.stopping, self.zero_request);
-        *self = Startup { error, doubt, hand, continuity, tared, angles, declared, ..Startup::new() };
+        let zeroed_at = self.zeroed_at;
+        *self = Startup { error, doubt, hand, continuity, tared, angles, declared, zeroed_at, ..Startup::new() };
         (self.tared_anew, self.stopping, self.zero_request) = (tared_anew, stopping, zero_request);
     }
 
     /// Asks the safety module if positions count from a known pose.
     fn ask_zero(&mut self, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
-        Ok(match self.ask_safety(self.safety()?.zero, outlet)? {
-            None => Next::Stay,
-            Some(0) => {
+        let Some(zero) = self.ask_safety(self.safety()?.zero, outlet)? else { return Ok(Next::Stay) };
+        self.zeroed = zero != 0 && self.doubt.is_none();
+        self.zeroed_at = self.zeroed_at();
+        Ok(match zero {
+            0 => {
                 self.error = None;
-                Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US })
+                self.await_next_zero(outlet)
             }
-            Some(_) if self.doubt.is_some() => {
+            _ if self.doubt.is_some() => {
                 self.error = self.doubt;
                 Next::Go(Step::RevokeZero { word: 0 })
             }
-            Some(_) => {
-                self.zeroed = true;
-                Next::Go(Step::Tare)
-            }
+            _ => Next::Go(Step::Tare),
         })
     }
 

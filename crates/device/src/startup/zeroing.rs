@@ -110,13 +110,14 @@ impl Startup {
     /// The arm is not idle, or it moves. Back to where the command came in: to the loop, or to the person.
     pub(super) fn refuse_zero(&mut self, outlet: &mut impl Outlet) -> Next {
         self.zero_request = ZeroRequest::Answered(Err(Refusal::ZeroNeedsIdle));
+        if self.zeroed { Next::Go(Step::AskZero) } else { self.await_next_zero(outlet) }
+    }
+
+    /// The arm has no zero. What waits for one is the loop, if it was begun: a hand would be told to be ready, and
+    /// nobody would ask it.
+    pub(super) fn await_next_zero(&self, outlet: &mut impl Outlet) -> Next {
         let next_us = outlet.now_us() + POLL_US;
-        Next::Go(match (self.zeroed, self.from_loop) {
-            (true, _) => Step::AskZero,
-            // A hand would be told to be ready, and nobody would ask it.
-            (false, true) => Step::Tare,
-            (false, false) => Step::AwaitZero { next_us },
-        })
+        Next::Go(if self.from_loop { Step::Tare } else { Step::AwaitZero { next_us } })
     }
 
     pub(super) fn await_zero(&mut self, next_us: u64, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
@@ -136,7 +137,9 @@ impl Startup {
     /// The pucks have lost power, and with it everything read and written. A doubt stays: the word may be wrong.
     fn power_is_off(&mut self) {
         let (hand, zero_request, declared, doubt) = (self.hand.again(), self.zero_request, self.declared, self.doubt);
-        *self = Startup { hand, zero_request, declared, doubt, ..Startup::new() };
+        // The mode may have been misheard.
+        let zeroed_at = self.zeroed_at;
+        *self = Startup { hand, zero_request, declared, doubt, zeroed_at, ..Startup::new() };
     }
 
     pub(super) fn write_position(&mut self, joint: u8, until_us: u64, outlet: &mut impl Outlet) -> Next {

@@ -10,5 +10,6 @@ mod double;
 mod hand;
 mod hand_anew;
 mod late;
+mod remembered_zero;
 mod startup;
 mod zero;
