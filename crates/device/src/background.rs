@@ -10,6 +10,7 @@
 //! | MODE of each hand puck | 10 Hz, while there is a hand | a SET has no acknowledge, and others may set modes too |
 //! | TEMP | 1 Hz for each puck | heat |
 //! | STAT of sensor or hand, if the start-up missed it | 10 Hz, in turn | the arm carries it all the same |
+//! | STAT of one puck of a hand, if it missed that one | 10 Hz, while the arm is IDLE | the hand comes back with it |
 //!
 //! The odd slots may be taken by the hand for something more urgent. A property that is new here has to be named in
 //! [`BackgroundPoll::take`], which takes every other answer for the pendant word.
@@ -102,7 +103,12 @@ impl BackgroundPoll {
 
     /// The question whose turn it is, if there is one; `hand`: its pucks may be asked too; `braking`: the puck (0..=6)
     /// that is to be asked if it brakes, out of turn.
-    pub(crate) fn other(&mut self, hand: bool, absent: (bool, bool), braking: Option<usize>) -> Option<CanFrame> {
+    pub(crate) fn other(
+        &mut self,
+        hand: bool,
+        absent: (bool, Option<Node>),
+        braking: Option<usize>,
+    ) -> Option<CanFrame> {
         let tick = self.tick;
         let due = |(period, offset): (u32, u32)| tick.checked_rem(period) == Some(offset);
         let turn = |period: u32, pucks: usize| (tick.checked_div(period)? as usize).checked_rem(pucks);
@@ -119,9 +125,13 @@ impl BackgroundPoll {
             (Node::SAFETY_MODULE, self.pendant)
         } else if hand && due(HAND_TEMPERATURES) {
             (*Node::HAND.get(turn(HAND_TEMPERATURES.0, Node::HAND.len())?)?, TEMPERATURE)
-        } else if (absent.0 || absent.1) && due(ABSENT) {
-            let turn = turn(ABSENT.0, 2)? == 0;
-            let node = if absent.0 && (turn || !absent.1) { Node::FORCE_TORQUE } else { *Node::HAND.first()? };
+        } else if due(ABSENT)
+            && let Some(node) = match absent {
+                (true, Some(digit)) => Some(if turn(ABSENT.0, 2)? == 0 { Node::FORCE_TORQUE } else { digit }),
+                (true, None) => Some(Node::FORCE_TORQUE),
+                (false, digit) => digit,
+            }
+        {
             (node, PropertyId::STAT)
         } else if due(TEMPERATURES) {
             (*Node::ARM.get(turn(TEMPERATURES.0, Node::ARM.len())?)?, TEMPERATURE)
@@ -180,7 +190,7 @@ mod tests {
         let mut poll = BackgroundPoll::new(&safety);
         let mut counts = BTreeMap::new();
         for _ in 0..control::RATE_HZ as usize * seconds {
-            if let Some(frame) = poll.begin().or_else(|| poll.other(hand, (false, false), None)) {
+            if let Some(frame) = poll.begin().or_else(|| poll.other(hand, (false, None), None)) {
                 let request = Request::decode(&frame).expect("a request");
                 let puck::Destination::Node(node) = request.to else { panic!("a poll to a group") };
                 let puck::Action::Get { property } = request.action else { panic!("a poll that sets") };

@@ -408,12 +408,15 @@ impl DeviceController {
         if !self.cycle.state().has_torque() && self.startup.revoke_zero(&mut outlet) {
             return;
         }
+        let rests = self.safety_mode == Some(SafetyMode::Idle) && !self.cycle.state().has_torque();
         let question = match (poll.begin(), self.round.suspect()) {
             (Some(safety), _) => Some(safety),
             (None, Some(node)) => Some(poll.suspect(node)),
             (None, None) if self.hand.act(&mut outlet) => None,
             (None, None) if self.brakes.look(self.safety_mode) => Some(poll.first_mode()),
-            (None, None) => poll.other(self.hand.answers_questions(), self.startup.absent(), self.brakes.suspect()),
+            (None, None) => {
+                poll.other(self.hand.answers_questions(), self.startup.absent(rests), self.brakes.suspect())
+            }
         };
         if let Some(frame) = question {
             outlet.send(frame);

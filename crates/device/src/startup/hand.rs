@@ -47,6 +47,11 @@ impl Survey {
         self.digits() > 0
     }
 
+    /// The puck of the hand that tells whether it is there now: one that did not answer.
+    pub(super) fn missing_digit(&self) -> Option<Node> {
+        Node::HAND.into_iter().find(|node| !self.is_present(*node))
+    }
+
     /// True if some pucks of a hand answered and others did not, or not yet.
     pub(super) fn hand_is_partial(&self) -> bool {
         !matches!(self.digits(), 0 | 4)
@@ -74,7 +79,7 @@ impl Startup {
         let asleep = |node: &Node| self.survey.seen(*node).status != Some(Status::Ready.value());
         self.hand.slept |= Node::HAND.iter().any(asleep);
         if self.survey.hand_is_partial()
-            && let Some(node) = Node::HAND.into_iter().find(|node| !self.survey.is_present(*node))
+            && let Some(node) = self.survey.missing_digit()
         {
             self.drop_hand(node, HandFailure::Missing);
         }

@@ -349,10 +349,11 @@ impl Startup {
         self.survey.is_present(Node::FORCE_TORQUE)
     }
 
-    /// Tells which of the sensor and the hand did not answer.
-    pub(crate) fn absent(&self) -> (bool, bool) {
-        let hand = Node::HAND.into_iter().any(|node| self.survey.is_present(node));
-        (!self.has_sensor(), !hand)
+    /// Whom to ask because the start-up did not find them: the sensor, and a puck of the hand. One puck of four tells
+    /// nothing of what the arm carries, so the start-up is not begun anew for it unless the arm `rests`, IDLE.
+    pub(crate) fn absent(&self, rests: bool) -> (bool, Option<Node>) {
+        let digit = self.survey.missing_digit().filter(|_| rests || !self.survey.has_digits());
+        (!self.has_sensor(), digit)
     }
 
     /// The reason for which the start-up begins anew.

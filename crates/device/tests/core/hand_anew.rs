@@ -1,9 +1,12 @@
 //! The hand while the bus is started anew: what is told of it meanwhile, and what brings it back.
 
-use device::{Command, Controller, DeviceController, EventKind, Refusal, Stage};
+use control::{Command as Control, Fault, State};
+use device::{Command, Controller, DeviceController, EventKind, HandFailure, Refusal, Stage, StartupError};
 use link::HandStage;
+use puck::Node;
 
-use crate::double::{Bus, HOME, holding_with_ready_hand};
+use crate::digit::Digit;
+use crate::double::{Bus, HOME, holding_with_ready_hand, silent_device};
 
 /// An arm at rest, IDLE, whose hand is ready.
 fn resting_with_ready_hand() -> (Box<DeviceController>, Bus) {
@@ -64,4 +67,145 @@ fn a_refused_zeroing_of_an_arm_that_has_lost_its_zero_leaves_the_hand_in_the_loo
     bus.run(&mut core, 0.05);
     bus.run_until(&mut core, Stage::WaitingForActive);
     assert!(core.health().zeroed);
+}
+
+/// An arm that was zeroed and stands, IDLE, whose hand lacks this digit since the start-up.
+fn without_digit(digit: usize) -> (Box<DeviceController>, Bus) {
+    let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());
+    bus.digits[digit].present = false;
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    let missing = EventKind::Hand { stage: HandStage::Absent, cause: Some((Node::HAND[digit], HandFailure::Missing)) };
+    assert!(bus.events.contains(&missing), "{:?}", bus.events);
+    bus.run(&mut core, 1.0);
+    assert_eq!((core.stage(), core.health().hand), (Stage::WaitingForActive, HandStage::Absent), "it does not answer");
+    (core, bus)
+}
+
+/// The change that makes it fail: only a hand of which no puck answered is looked for.
+#[test]
+fn g4_a_digit_that_was_missing_at_the_start_up_brings_the_hand_back_once_it_answers() {
+    for digit in 0..4 {
+        let (mut core, mut bus) = without_digit(digit);
+        bus.digits[digit].present = true;
+        bus.run(&mut core, 0.3);
+        let reason = StartupError::AnswersLate(Node::HAND[digit]);
+        assert!(bus.events.contains(&EventKind::Blocked(reason)), "{:?}", bus.events);
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        let health = core.health();
+        assert_eq!((health.hand, health.fault, health.zeroed), (HandStage::NotInitialised, Fault::None, true));
+        let faults =
+            bus.events.iter().filter(|event| matches!(event, EventKind::Entered(_, fault) if *fault != Fault::None));
+        assert_eq!(faults.count(), 0, "{:?}", bus.events);
+        bus.press_activate();
+        bus.run_until(&mut core, Stage::Ready);
+        bus.commands.extend([Control::Hold.into(), Command::InitialiseHand]);
+        bus.run(&mut core, 8.0);
+        assert_eq!((core.health().state, core.health().hand), (State::Hold, HandStage::Ready), "{:?}", bus.events);
+    }
+}
+
+/// A hand of three digits does not stop the arm, and neither does the fourth: it weighs what it weighed. The change
+/// that makes it fail: it is looked for under an ACTIVE safety module too.
+#[test]
+fn a_missing_digit_that_answers_while_the_arm_is_active_waits_until_it_is_idle() {
+    let (mut core, mut bus) = without_digit(2);
+    bus.press_activate();
+    bus.run_until(&mut core, Stage::Ready);
+    bus.digits[2].present = true;
+    bus.run(&mut core, 1.0);
+    assert_eq!(core.stage(), Stage::Ready, "{:?}", bus.events);
+    bus.commands.push_back(Control::Hold.into());
+    bus.run(&mut core, 1.0);
+    assert_eq!((core.health().state, core.health().fault), (State::Hold, Fault::None), "{:?}", bus.events);
+    bus.commands.push_back(Control::Release.into());
+    bus.run(&mut core, 3.0);
+    bus.press_idle();
+    bus.run(&mut core, 0.4);
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    assert_eq!(core.health().hand, HandStage::NotInitialised);
+}
+
+/// G2: a hand that was ready and loses a digit over a new start is not ready when that one comes back, not even if it
+/// was awake all the while.
+#[test]
+fn g2_a_hand_that_was_ready_and_came_back_digit_by_digit_is_initialised_anew() {
+    for restarts in [false, true] {
+        let (mut core, mut bus) = resting_with_ready_hand();
+        bus.digits[1].present = false;
+        core.note_bus_error(true);
+        bus.run(&mut core, 0.1);
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        assert_eq!(core.health().hand, HandStage::Absent);
+        if restarts {
+            bus.digits[1].lose_power();
+        }
+        bus.digits[1].present = true;
+        bus.run(&mut core, 0.3);
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        assert_eq!(core.health().hand, HandStage::NotInitialised, "{:?}", bus.events);
+    }
+}
+
+#[test]
+fn a_hand_that_kept_its_power_stays_ready_over_a_new_start() {
+    let (mut core, mut bus) = holding_with_ready_hand();
+    core.note_bus_error(true);
+    bus.run(&mut core, 0.1);
+    assert_eq!(core.health().hand, HandStage::Absent, "nothing is known while the bus starts");
+    bus.press_idle();
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    assert_eq!(core.health().hand, HandStage::Ready);
+
+    bus.press_emergency_stop();
+    bus.run(&mut core, 1.0);
+    bus.press_idle();
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    assert_eq!(core.health().hand, HandStage::NotInitialised, "it lost its power, and with it its positions");
+}
+
+#[test]
+fn a_hand_woken_by_a_start_up_that_failed_is_not_taken_for_one_that_kept_its_power() {
+    let (mut core, mut bus) = holding_with_ready_hand();
+    bus.press_emergency_stop();
+    bus.run(&mut core, 1.0);
+    bus.pucks[3].never_wakes = true;
+    bus.press_idle();
+    bus.run(&mut core, 4.0);
+    assert!(core.health().blocked.is_some() && bus.digits[0].awake_at.is_some());
+    bus.pucks[3].never_wakes = false;
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    assert_eq!(core.health().hand, HandStage::NotInitialised);
+}
+
+#[test]
+fn a_hand_that_is_ready_stays_so_over_a_zeroing_that_fails() {
+    let (mut core, mut bus) = holding_with_ready_hand();
+    bus.press_idle();
+    bus.run(&mut core, 0.2);
+    bus.pucks[3].ignores_position_writes = true;
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::Blocked);
+    bus.pucks[3].ignores_position_writes = false;
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.run(&mut core, 0.5);
+    assert_eq!(core.health().hand, HandStage::Ready, "it kept its power: its fingers need not open again");
+
+    // One that loses its power meanwhile has lost its positions.
+    bus.pucks[3].ignores_position_writes = true;
+    bus.commands.push_back(Command::Zero { home: [0.1, 0.5, 0.1, 1.5, 0.1, 0.2, 0.1] });
+    bus.run_until(&mut core, Stage::Blocked);
+    bus.pucks[3].ignores_position_writes = false;
+    bus.digits.iter_mut().for_each(Digit::lose_power);
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    assert_eq!(core.health().hand, HandStage::NotInitialised);
 }
