@@ -33,7 +33,12 @@ pub enum EventKind {
     /// The bus start-up cannot go on, for this reason. It tries again by itself; told once per reason.
     Blocked(StartupError),
     /// The safety module reports another mode than before.
-    Safety(SafetyMode),
+    Safety {
+        /// The mode.
+        mode: SafetyMode,
+        /// True if it went to IDLE because this device has asked for it, and no person: brakes alone hold the arm.
+        is_asked_for: bool,
+    },
     /// The run no longer goes as the successful ones before it.
     Surprised {
         /// Progress of the movement, 0 to 1.

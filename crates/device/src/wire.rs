@@ -79,7 +79,9 @@ pub(crate) fn event(event: Event) -> Option<LinkEvent> {
         EventKind::Hand { stage, cause } => {
             (LinkKind::Hand, stage.code().into(), cause.map_or(0, |(node, failure)| failure.number(node)))
         }
-        EventKind::Safety(mode) => (LinkKind::SafetyMode, u16::try_from(mode.value()).unwrap_or(u16::MAX), 0),
+        EventKind::Safety { mode, is_asked_for } => {
+            (LinkKind::SafetyMode, u16::try_from(mode.value()).unwrap_or(u16::MAX), is_asked_for.into())
+        }
     };
     Some(LinkEvent { cycle: cycle(event.cycle), kind, code, detail })
 }

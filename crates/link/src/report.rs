@@ -338,7 +338,8 @@ pub enum EventKind {
     Arrived,
     /// The bus start-up reached a stage: `code` is the stage.
     Startup,
-    /// The safety module changed mode: `code` is the new mode.
+    /// The safety module changed mode: `code` is the new mode, `detail` 1 if the device has asked for it: brakes alone
+    /// hold the arm, for example one that was activated and fell before anybody had commanded it.
     SafetyMode,
     /// The host fell silent during a motion and the device stops it: `detail` is the silence in ms.
     LinkTimeout,

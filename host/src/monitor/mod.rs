@@ -6,7 +6,7 @@ mod screen;
 use std::collections::VecDeque;
 
 use control::{Fault, State, flags};
-use device::Stage;
+use device::{HandFailure, Stage};
 use dmp::CanonicalSystem;
 use lab::client::Gaps;
 use lab::error::explain_blocked;
@@ -49,10 +49,15 @@ impl Watch {
 
     /// Takes an event; in words.
     pub fn event(&mut self, event: &Event) -> &str {
+        self.note(event.cycle, &words(event))
+    }
+
+    /// Keeps what has happened in this cycle; in words.
+    pub(crate) fn note(&mut self, cycle: u32, what: &str) -> &str {
         if self.events.len() == EVENTS {
             self.events.pop_front();
         }
-        self.events.push_back(format!("cycle {}: {}", event.cycle, words(event)));
+        self.events.push_back(format!("cycle {cycle}: {what}"));
         self.events.back().map_or("", String::as_str)
     }
 
@@ -172,6 +177,9 @@ fn words(event: &Event) -> String {
         EventKind::Startup => {
             Stage::from_code(code).map_or_else(|| "start-up".to_owned(), |stage| format!("start-up: {stage}"))
         }
+        EventKind::SafetyMode if event.detail != 0 => {
+            "safety module: idle, as the device asked for it: brakes alone hold the arm".to_owned()
+        }
         EventKind::SafetyMode => format!(
             "safety module: {}",
             ["emergency stop", "idle", "active"].get(usize::from(code)).unwrap_or(&"unknown")
@@ -184,6 +192,30 @@ fn words(event: &Event) -> String {
             let channel = CHANNELS.get(usize::from(event.code)).unwrap_or(&"a channel");
             format!("not as the successful runs: {channel}, {:.0} % on the way", f64::from(event.detail) / 10.0)
         }
-        EventKind::Hand => format!("hand: {}", HandStage::from_code(code).map_or("unknown", HandStage::name)),
+        EventKind::Hand => {
+            let stage = HandStage::from_code(code).map_or("unknown", HandStage::name);
+            HandFailure::from_number(event.detail).map_or_else(
+                || format!("hand: {stage}"),
+                |(node, failure)| format!("hand: {stage}: its puck {} {failure}", node.number()),
+            )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(kind: EventKind, code: u16, detail: u32) -> String {
+        words(&Event { cycle: 0, kind, code, detail })
+    }
+
+    #[test]
+    fn an_activation_that_the_device_took_back_is_told_as_its_own_wish_and_a_lost_hand_with_its_puck() {
+        assert_eq!(told(EventKind::SafetyMode, 1, 0), "safety module: idle");
+        assert!(told(EventKind::SafetyMode, 1, 1).contains("the device asked for it"));
+        assert_eq!(told(EventKind::Hand, 3, 0), "hand: ready");
+        let missing = HandFailure::Missing.number(puck::Node::SPREAD);
+        assert_eq!(told(EventKind::Hand, 0, missing), "hand: absent: its puck 14 does not answer");
     }
 }

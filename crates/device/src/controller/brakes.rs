@@ -45,6 +45,11 @@ impl Brakes {
         self.wanted = wanted;
     }
 
+    /// True while the control cycle wants the safety module to go to IDLE.
+    pub(super) fn are_wanted(&self) -> bool {
+        self.wanted
+    }
+
     /// A puck (0..=6) has told if it brakes; `active`: while the safety module is ACTIVE.
     pub(super) fn hear_puck(&mut self, puck: usize, braking: bool, active: bool) {
         if puck == 0 {

@@ -219,8 +219,9 @@ impl DeviceController {
         self.fresh_safety = Some(mode);
         self.brakes.hear_safety(mode);
         if self.safety_mode != Some(mode) {
+            let is_asked_for = mode == SafetyMode::Idle && self.brakes.are_wanted();
             self.safety_mode = Some(mode);
-            self.tell(EventKind::Safety(mode), io);
+            self.tell(EventKind::Safety { mode, is_asked_for }, io);
         }
     }
 

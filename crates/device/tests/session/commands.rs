@@ -430,7 +430,8 @@ fn events_reach_the_host() {
         (EventKind::Entered(State::SoftStop, Fault::TipSpeed), LinkKind::State, State::SoftStop.code(), 5),
         (EventKind::Arrived, LinkKind::Arrived, 0, 0),
         (EventKind::Startup(Stage::Ready), LinkKind::Startup, Stage::Ready.code(), 0),
-        (EventKind::Safety(SafetyMode::Idle), LinkKind::SafetyMode, 1, 0),
+        (EventKind::Safety { mode: SafetyMode::Idle, is_asked_for: false }, LinkKind::SafetyMode, 1, 0),
+        (EventKind::Safety { mode: SafetyMode::Idle, is_asked_for: true }, LinkKind::SafetyMode, 1, 1),
     ];
     for (kind, told, code, detail) in pairs {
         rig.event(kind);
