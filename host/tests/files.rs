@@ -70,6 +70,22 @@ fn h14_an_output_that_is_an_input_a_device_or_a_folder_is_refused_even_when_forc
     assert_eq!(names(at), ["demo.csv", "reach.toml"]);
 }
 
+/// A comma ends an option of an address. The change that makes it fail: the name is added to the text of the address;
+/// what stood behind the comma was refused as an option, or taken for one.
+#[test]
+fn a_flash_and_a_script_with_a_comma_in_their_names_are_these_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/faults/a3.toml");
+    std::fs::copy(script, at.join("a,3.toml")).unwrap();
+    let serve = "sim --listen unix:arm.sock --duration 0.05 --fast";
+    let line = format!("--device sil:world=simple {serve} --flash a,seed=3,b.flash --faults a,3.toml:2");
+    tactus(at, &line).success();
+    assert_eq!(names(at), ["a,3.toml", "a,seed=3,b.flash"]);
+    let hand = tactus(at, &format!("--device hand: {serve} --flash a.flash")).failure();
+    assert!(stderr(&hand).contains("not 'flash'"), "{}", stderr(&hand));
+}
+
 #[test]
 fn h14_a_file_that_is_named_twice_as_an_output_or_as_a_log_is_refused_before_anything_is_written() {
     let folder = learned(2.0);

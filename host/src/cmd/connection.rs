@@ -419,7 +419,7 @@ pub(super) fn simulation_failure(error: SimulationError, doing: &str) -> Failure
 
 /// Who this is, for people who find the device busy. Nobody else finds a simulated device of this process, and what
 /// is said to it must be the same in every run, or its virtual times would not be.
-fn owner(simulated: bool) -> String {
+pub(super) fn owner(simulated: bool) -> String {
     if simulated {
         return "tactus".to_owned();
     }
@@ -459,15 +459,15 @@ pub(super) fn interrupt() -> Interrupt {
 /// # Errors
 /// The address is not that of a simulated device, or the simulation cannot be started.
 pub(super) fn simulated(
+    address: &Address,
     text: &str,
     doing: &str,
     adjust: impl FnOnce(&mut SimulationOptions),
 ) -> Result<(Device, Interrupt), Failure> {
-    let address: Address = text.parse().map_err(|error| HostError::Address(error).into_failure(doing))?;
     if !matches!(address, Address::Simulated(..)) {
         return Err(Failure::new(ErrorCode::NotSimulated, doing, format!("'{text}' is not a simulated device")));
     }
-    let device = Device::open(&address, adjust).map_err(|error| match error {
+    let device = Device::open(address, adjust).map_err(|error| match error {
         OpenError::Transport(error) => HostError::Transport(error).into_failure(doing),
         OpenError::Simulation(error) => simulation_failure(error, doing),
     })?;

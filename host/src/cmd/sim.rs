@@ -21,6 +21,7 @@ use super::{ErrorCode, Failure, Global, Output, connection};
 use bus::BusServer;
 use lab::client::Interrupt;
 use lab::device::Device;
+use lab::error::HostError;
 use lab::quoted;
 use lab::simulation::Engine;
 use lab::transport::{Address, AddressError, Transport, TransportError};
@@ -98,16 +99,16 @@ impl Drop for Listener {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "sim";
     let output = global.output();
-    // Options are added to the text below: a mistake in what was given is told before, with its place.
+    // A mistake in what was given is told with its place.
     global.address(DOING)?;
     // Without co-controller there is no image to look for.
     let usual = if command.can_only { "sil:" } else { "sim:" };
-    let mut device = global.device.clone().unwrap_or_else(|| usual.to_owned());
-    let flash = command.flash.as_ref().map(|file| format!("flash={}", file.display()));
-    let faults = command.faults.as_ref().map(|file| format!("faults={file}"));
-    for option in flash.into_iter().chain(faults) {
-        let comma = if device.ends_with(':') { "" } else { "," };
-        device = format!("{device}{comma}{option}");
+    let device = global.device.as_deref().unwrap_or(usual);
+    let bad_address = |error| HostError::Address(error).into_failure(DOING);
+    let mut address: Address = device.parse().map_err(bad_address)?;
+    if let Address::Simulated(kind, options) = &mut address {
+        let added = options.add_files(*kind, command.flash.as_deref(), command.faults.as_deref());
+        added.map_err(bad_address)?;
     }
     let refused = |address: &str, cause: Box<dyn std::error::Error + Send + Sync>| {
         Failure::new(ErrorCode::CannotListen, format!("sim: cannot listen on {address}"), cause)
@@ -122,7 +123,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let listener = (!command.can_only)
         .then(|| listen(&command.listen).map_err(|cause| refused(&command.listen, cause)))
         .transpose()?;
-    let (mut device, interrupt) = connection::simulated(&device, DOING, |options| {
+    let (mut device, interrupt) = connection::simulated(&address, device, DOING, |options| {
         options.replace_logs = global.force;
         if command.can_only {
             options.engine = Engine::Absent;
@@ -141,7 +142,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     output.say(format!("the pendant's buttons, typed here: {}", pendant::WORDS));
     let served = serve(command, &mut device, listener.as_ref(), bus.as_mut(), &interrupt, output);
-    served.map_err(|error| lab::error::HostError::Transport(error).into_failure(DOING))?;
+    served.map_err(|error| HostError::Transport(error).into_failure(DOING))?;
     let seconds = device.now().as_secs_f64();
     output.result(&Simulated { simulated_s: seconds }, format!("{seconds:.1} s simulated"))
 }

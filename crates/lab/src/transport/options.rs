@@ -1,7 +1,7 @@
 //! Options of a simulated device: the part of its address behind the colon.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::AddressError;
 
@@ -110,9 +110,7 @@ impl SimulatorOptions {
                 return Err(AddressError::Twice(name.to_owned()));
             }
             given.push(name);
-            if kind == SimulatorKind::Hand && ["arm", "held", "flash", "faults"].contains(&name) {
-                return Err(AddressError::HandOption(part.to_owned()));
-            }
+            refuse_of_hand(kind, name, part)?;
             match part.split_once('=').filter(|(_, value)| !value.is_empty()) {
                 Some(("seed", value)) => {
                     options.seed =
@@ -136,6 +134,38 @@ impl SimulatorOptions {
         }
         Ok(options)
     }
+
+    /// Adds the flash and the script of faults that are given beside the address. A comma in a path, which ends an
+    /// option in an address, belongs to the path here.
+    ///
+    /// # Errors
+    /// [`AddressError::Twice`] for what the address gives as well, [`AddressError::HandOption`] for a hand alone.
+    pub fn add_files(
+        &mut self,
+        kind: SimulatorKind,
+        flash: Option<&Path>,
+        faults: Option<&str>,
+    ) -> Result<(), AddressError> {
+        if let Some(path) = flash {
+            refuse_of_hand(kind, "flash", "flash")?;
+            if self.flash.replace(path.to_owned()).is_some() {
+                return Err(AddressError::Twice("flash".to_owned()));
+            }
+        }
+        if let Some(script) = faults {
+            refuse_of_hand(kind, "faults", "faults")?;
+            if self.faults.replace(script.to_owned()).is_some() {
+                return Err(AddressError::Twice("faults".to_owned()));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Refuses an option, `part` of an address, that a hand alone does not have.
+fn refuse_of_hand(kind: SimulatorKind, name: &str, part: &str) -> Result<(), AddressError> {
+    let refused = kind == SimulatorKind::Hand && ["arm", "held", "flash", "faults"].contains(&name);
+    if refused { Err(AddressError::HandOption(part.to_owned())) } else { Ok(()) }
 }
 
 impl BoardOptions {
