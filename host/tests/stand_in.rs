@@ -255,6 +255,32 @@ fn a_program_that_was_suspended_in_a_move_says_so_and_waits_for_nothing() {
     assert!(begun.elapsed() < Duration::from_secs(20), "after {:?}", begun.elapsed());
 }
 
+/// Ctrl-Z and `fg`, or a machine that slept. The change that makes it fail: whoever the device has let go of is refused
+/// for good.
+#[test]
+fn a_monitor_that_was_suspended_looks_on_anew_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let _arm = StandIn::start(at);
+    assert!(tactus(at, "hand --at-home init").status.success());
+    let mut monitor = Command::new(env!("CARGO_BIN_EXE_tactus"));
+    monitor.current_dir(at).env("TACTUS_DEVICE", "unix:tactus.sock").args(["--json", "monitor"]);
+    let mut monitor = monitor.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let signal = |name: &str, id: u32| Command::new("kill").args([name, &id.to_string()]).status().unwrap().success();
+    let mut lines = BufReader::new(monitor.stdout.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.by_ref().any(|line| line.contains("q_rad")), "it looks on");
+    assert!(signal("-STOP", monitor.id()));
+    // The device lets go of who looks on after two seconds: 600 cycles.
+    let suspended = cycle(at);
+    while cycle(at) < suspended + 1200 {}
+    assert!(signal("-CONT", monitor.id()));
+    assert!(lines.by_ref().any(|line| line.contains("looks on anew")), "it says so");
+    let told: Value = serde_json::from_str(&lines.find(|line| line.contains("q_rad")).unwrap()).unwrap();
+    assert!(told["cycle"].as_u64().unwrap() >= suspended + 1200, "{told}");
+    monitor.kill().unwrap();
+    monitor.wait().unwrap();
+}
+
 /// `tactus --json monitor | head -1`: it would watch for ever, and keep one of two places from others.
 #[test]
 fn a_monitor_ends_when_nobody_reads_its_lines_any_more() {

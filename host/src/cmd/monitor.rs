@@ -14,6 +14,7 @@ use crate::monitor::{Streamed, Watch, draw};
 use lab::client::{Client, Incoming};
 use lab::device::Device;
 use lab::error::HostError;
+use link::Refusal;
 
 /// Cycles between two that are asked for: 30 a second.
 const EVERY: u8 = 10;
@@ -26,6 +27,9 @@ const ASK_EVERY: Duration = Duration::from_millis(500);
 
 /// Time between two looks at the keyboard.
 const LOOK_EVERY: Duration = Duration::from_millis(60);
+
+/// Words where the device let go of this program.
+const ANEW: &str = "the monitor was suspended, and looks on anew: what happened meanwhile is not shown";
 
 /// Options of `monitor`.
 #[derive(Debug, Clone, Args)]
@@ -61,7 +65,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         let terminal = ratatui::try_init().map_err(|cause| Failure::new(ErrorCode::NoTerminal, DOING, cause))?;
         View::Screen(terminal, keys())
     };
-    let watched = follow(&mut client, &mut watch, &mut view, command.duration);
+    let watched = follow_on(&mut client, &mut watch, &mut view, command.duration);
     if let View::Screen(..) = view {
         ratatui::restore();
     }
@@ -97,13 +101,49 @@ enum Wish {
     Leave,
 }
 
-fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, duration: Option<f64>) -> Result<(), Ended> {
+/// Follows, and looks on anew wherever the device has let go of this program, which was suspended.
+fn follow_on(
+    client: &mut Client<Device>,
+    watch: &mut Watch,
+    view: &mut View,
+    duration: Option<f64>,
+) -> Result<(), Ended> {
+    let end = duration.map(|seconds| client.now() + Duration::from_secs_f64(seconds));
+    loop {
+        match follow(client, watch, view, end) {
+            Err(Ended::Host(HostError::Refused { reason: Refusal::NoSession, .. })) => {}
+            ended => return ended,
+        }
+        let owner = connection::owner(client.is_virtual());
+        client.observe_anew(&owner)?;
+        let cycle = client.status()?.cycle;
+        let words = watch.note(cycle, ANEW).to_owned();
+        match view {
+            View::Lines(output) => {
+                if !output.line(&Streamed::Event { event: words, cycle }, "").map_err(Ended::View)? {
+                    return Ok(());
+                }
+            }
+            View::Screen(terminal, _) => {
+                // A shell has had the terminal meanwhile.
+                ratatui::restore();
+                *terminal = ratatui::try_init().map_err(broken)?;
+            }
+        }
+    }
+}
+
+/// The terminal cannot be used.
+fn broken(cause: std::io::Error) -> Ended {
+    Ended::View(Failure::new(ErrorCode::NoTerminal, "monitor", cause))
+}
+
+fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, end: Option<Duration>) -> Result<(), Ended> {
     client.set_telemetry(EVERY)?;
-    let started = client.now();
     let (mut asked, mut drawn, mut line) = (None, None, None);
     loop {
         let now = client.now();
-        if duration.is_some_and(|seconds| (now - started).as_secs_f64() >= seconds) {
+        if end.is_some_and(|end| now >= end) {
             return Ok(());
         }
         if asked.is_none_or(|asked| now.saturating_sub(asked) >= ASK_EVERY) {
@@ -137,7 +177,6 @@ fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, durat
         if let View::Screen(terminal, keys) = view
             && drawn.is_none_or(|drawn| client.now().saturating_sub(drawn) >= LOOK_EVERY)
         {
-            let broken = |cause| Ended::View(Failure::new(ErrorCode::NoTerminal, "monitor", cause));
             terminal.draw(|frame| draw(frame, watch)).map_err(broken)?;
             drawn = Some(client.now());
             match wish(keys).map_err(broken)? {

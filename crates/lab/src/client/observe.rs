@@ -5,7 +5,7 @@ use std::time::Duration;
 use link::message::HostHello;
 use link::{LINK_VERSION, Refusal, Reply, Request, SCHEMA_HASH, Text};
 
-use super::{BUSY_TIMEOUT, Client};
+use super::{BUSY_TIMEOUT, Client, session_number};
 use crate::error::HostError;
 use crate::transport::Transport;
 
@@ -22,6 +22,24 @@ impl<T: Transport> Client<T> {
     /// As [`Client::connect`]; [`HostError::Watched`] if two others look on already.
     pub fn observe(transport: T, owner: &str) -> Result<Self, HostError> {
         let mut client = Self::begin(transport)?;
+        client.look_on(owner)?;
+        Ok(client)
+    }
+
+    /// Looks on anew, on the same line, once the device has let go of this host: it does so of one that was suspended.
+    /// A stream of telemetry has to be asked for again.
+    ///
+    /// # Errors
+    /// As [`Client::observe`].
+    pub fn observe_anew(&mut self, owner: &str) -> Result<(), HostError> {
+        (self.open, self.session, self.sequence, self.device_ms) =
+            (false, session_number(self.transport.is_virtual()), 0, 0);
+        // Answers to what was asked before have numbers that are given anew.
+        self.answers.clear();
+        self.look_on(owner)
+    }
+
+    fn look_on(&mut self, owner: &str) -> Result<(), HostError> {
         let hello = HostHello {
             link_version: LINK_VERSION,
             schema_hash: SCHEMA_HASH,
@@ -29,27 +47,24 @@ impl<T: Transport> Client<T> {
             owner: Text::new(owner),
         };
         let greeting = Request::Observe(hello.clone());
-        let mut greeted = client.greet(&greeting, &hello, BUSY_TIMEOUT);
+        let mut greeted = self.greet(&greeting, &hello, BUSY_TIMEOUT);
         if let Err(HostError::Refused { reason: Refusal::Busy, detail: [_, wait], .. }) = greeted
             && wait < GONE_MS
         {
             // On a machine that is busy a simulated device's time passes more slowly than this clock.
-            greeted = client.greet(&greeting, &hello, 2 * Duration::from_millis(wait.into()));
+            greeted = self.greet(&greeting, &hello, 2 * Duration::from_millis(wait.into()));
         }
         match greeted {
-            Ok(device) => client.hello = device,
+            Ok(device) => self.hello = device,
             Err(HostError::Refused { reason: Refusal::Busy, detail: [_, wait_ms], .. }) => {
                 return Err(HostError::Watched { wait_ms });
             }
             // A device of an older version does not know the request; it knows a hello, and says what it is.
-            Err(HostError::NoAnswer { .. }) => {
-                client.open(owner, LINK_VERSION, SCHEMA_HASH, BUSY_TIMEOUT)?;
-                return Ok(client);
-            }
+            Err(HostError::NoAnswer { .. }) => return self.open(owner, LINK_VERSION, SCHEMA_HASH, BUSY_TIMEOUT),
             Err(error) => return Err(error),
         }
-        (client.open, client.observing) = (true, true);
-        Ok(client)
+        (self.open, self.observing) = (true, true);
+        Ok(())
     }
 
     /// The error for a device that another host has: with the name of that host, if the device tells an observer.

@@ -512,6 +512,27 @@ fn a_host_that_the_device_has_let_go_of_does_not_wait_on_and_blames_nobody() {
     }
 }
 
+/// The change that makes it fail: a host that looks on and was suspended is refused for good.
+#[test]
+fn who_looked_on_and_was_suspended_looks_on_anew_on_the_same_line() {
+    for milliseconds in [2_500, 10_000] {
+        let mut client = Client::observe(Device::new(), "onlooker").unwrap();
+        client.transport().suspended = milliseconds * 9 / 10;
+        let refused = loop {
+            match client.next(Duration::from_secs(1)) {
+                Ok(_) => {}
+                Err(error) => break error,
+            }
+        };
+        assert!(matches!(refused, HostError::Refused { reason: Refusal::NoSession, .. }), "{refused:?}");
+        client.observe_anew("onlooker").unwrap();
+        client.status().unwrap();
+        client.order_stop().unwrap();
+        let moves = client.gravity();
+        assert!(matches!(moves, Err(HostError::Refused { .. })), "who looks on commands nothing: {moves:?}");
+    }
+}
+
 #[test]
 fn a_device_that_falls_silent_is_given_up_after_two_seconds_of_listening() {
     let mut client = connected();
