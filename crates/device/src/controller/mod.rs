@@ -410,14 +410,14 @@ impl DeviceController {
             return;
         }
         let rests = self.safety_mode == Some(SafetyMode::Idle) && !self.cycle.state().has_torque();
+        let (sensor, digit) = self.startup.absent(rests);
+        let absent = (sensor, digit.or(self.hand.lost_puck().filter(|_| rests)));
         let question = match (poll.begin(), self.round.suspect()) {
             (Some(safety), _) => Some(safety),
             (None, Some(node)) => Some(poll.suspect(node)),
             (None, None) if self.hand.act(&mut outlet) => None,
             (None, None) if self.brakes.look(self.safety_mode) => Some(poll.first_mode()),
-            (None, None) => {
-                poll.other(self.hand.answers_questions(), self.startup.absent(rests), self.brakes.suspect())
-            }
+            (None, None) => poll.other(self.hand.answers_questions(), absent, self.brakes.suspect()),
         };
         if let Some(frame) = question {
             outlet.send(frame);

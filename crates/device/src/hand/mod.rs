@@ -125,6 +125,14 @@ impl Hand {
         }
     }
 
+    /// The puck that has restarted or fallen silent: it may sleep, and a start-up alone wakes it.
+    pub(crate) fn lost_puck(&self) -> Option<Node> {
+        match (self.stage, self.cause) {
+            (HandStage::Failed, Some((node, HandFailure::Reset | HandFailure::Silent))) => Some(node),
+            _ => None,
+        }
+    }
+
     /// True if its pucks may be asked for MODE and TEMP.
     pub(crate) fn answers_questions(&self) -> bool {
         matches!(self.stage, HandStage::NotInitialised | HandStage::Ready | HandStage::Failed)

@@ -60,9 +60,10 @@ fn a_refused_zeroing_of_an_arm_that_has_lost_its_zero_leaves_the_hand_in_the_loo
     bus.digits[1].lose_power();
     bus.run(&mut core, 0.5);
     assert_eq!(core.health().hand, HandStage::Failed, "somebody asks it");
-    // And a person gets on.
+    // And a person gets on, once the lost puck has been woken.
     bus.press_idle();
-    bus.run(&mut core, 0.1);
+    bus.run(&mut core, 0.5);
+    bus.run_until(&mut core, Stage::WaitingForZero);
     bus.commands.push_back(Command::Zero { home: HOME });
     bus.run(&mut core, 0.05);
     bus.run_until(&mut core, Stage::WaitingForActive);
@@ -125,6 +126,29 @@ fn a_missing_digit_that_answers_while_the_arm_is_active_waits_until_it_is_idle()
     bus.run(&mut core, 0.4);
     bus.run_until(&mut core, Stage::WaitingForActive);
     assert_eq!(core.health().hand, HandStage::NotInitialised);
+}
+
+/// A puck that has restarted sleeps, and nobody wakes it but a start-up: every initialisation failed, until an emergency
+/// stop. The change that makes it fail: only pucks that the start-up missed are looked for.
+#[test]
+fn g2_a_hand_that_lost_a_puck_in_the_loop_is_woken_and_initialised_once_the_arm_is_idle() {
+    for digit in 0..4 {
+        let (mut core, mut bus) = holding_with_ready_hand();
+        bus.digits[digit].lose_power();
+        bus.run(&mut core, 1.0);
+        assert_eq!((core.health().hand, core.health().state), (HandStage::Failed, State::Hold));
+        bus.commands.push_back(Control::Release.into());
+        bus.run(&mut core, 3.0);
+        bus.press_idle();
+        bus.run(&mut core, 0.5);
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        assert_eq!((core.health().hand, core.health().zeroed), (HandStage::NotInitialised, true), "{:?}", bus.events);
+        bus.press_activate();
+        bus.run_until(&mut core, Stage::Ready);
+        bus.commands.extend([Control::Hold.into(), Command::InitialiseHand]);
+        bus.run(&mut core, 8.0);
+        assert_eq!((core.health().state, core.health().hand), (State::Hold, HandStage::Ready), "{:?}", bus.events);
+    }
 }
 
 /// G2: a hand that was ready and loses a digit over a new start is not ready when that one comes back, not even if it
