@@ -10,7 +10,7 @@
 //! | MODE of each hand puck | 10 Hz, while there is a hand | a SET has no acknowledge, and others may set modes too |
 //! | TEMP | 1 Hz for each puck | heat |
 //! | STAT of sensor or hand, if the start-up missed it | 10 Hz, in turn | the arm carries it all the same |
-//! | STAT of one puck of a hand, if it was missed or is lost | 10 Hz, while the arm is IDLE | the hand comes back with it |
+//! | STAT of one puck of a hand, missed or lost | 10 Hz, while the arm is IDLE | the hand comes back with it |
 //!
 //! The odd slots may be taken by the hand for something more urgent. A property that is new here has to be named in
 //! [`BackgroundPoll::take`], which takes every other answer for the pendant word.

@@ -128,8 +128,8 @@ fn a_missing_digit_that_answers_while_the_arm_is_active_waits_until_it_is_idle()
     assert_eq!(core.health().hand, HandStage::NotInitialised);
 }
 
-/// A puck that has restarted sleeps, and nobody wakes it but a start-up: every initialisation failed, until an emergency
-/// stop. The change that makes it fail: only pucks that the start-up missed are looked for.
+/// A puck that has restarted sleeps, and nobody wakes it but a start-up: every initialisation failed,
+/// until an emergency stop. The change that makes it fail: only pucks that the start-up missed are looked for.
 #[test]
 fn g2_a_hand_that_lost_a_puck_in_the_loop_is_woken_and_initialised_once_the_arm_is_idle() {
     for digit in 0..4 {

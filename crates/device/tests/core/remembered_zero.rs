@@ -8,7 +8,7 @@ use crate::double::{Bus, HOME, started};
 /// A posture at which nobody zeroes in the end.
 const ELSEWHERE: [f32; 7] = [0.5, -1.9, 0.1, 2.8, 0.1, 0.1, 0.1];
 
-/// What befalls an arm that was zeroed at [`HOME`] and stands; what the device tells behind it of its zero.
+/// The zero as the device tells it after something has befallen an arm that was zeroed at [`HOME`] and stands.
 fn zero_behind(befall: impl FnOnce(&mut DeviceController, &mut Bus)) -> (bool, Option<[f32; 7]>) {
     let (mut core, mut bus) = started();
     bus.run(&mut core, 0.2);
@@ -79,7 +79,7 @@ fn g2_a_zero_that_is_lost_takes_its_posture_with_it() {
         bus.press_activate();
     };
     assert_eq!(zero_behind(refused), lost, "a safety module that restarted behind a refused zeroing");
-    // Somebody else zeroes an arm that this device had lost: the word of before is not told again.
+    // Somebody else zeroes an arm that this device had lost: the first posture is not told again.
     let (mut core, mut bus) = started();
     bus.safety_zero = false;
     core.note_bus_error(true);
