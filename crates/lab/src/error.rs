@@ -72,6 +72,12 @@ pub enum HostError {
         /// Time waited, in the device's time.
         after: Duration,
     },
+    /// Something answers at the line, and it is no device.
+    #[error("what is at the other end is no Tactus device: it said {bytes} bytes, and none of its messages")]
+    Strange {
+        /// Bytes that came.
+        bytes: usize,
+    },
     /// The program of the device is not made for a part that the command needs.
     #[error("the device does not {0}")]
     Lacks(Capability),
@@ -240,9 +246,15 @@ impl HostError {
                 ErrorCode::LineClosed
             }
             Self::NoAnswer { .. } => ErrorCode::NoAnswer,
+            Self::Strange { .. } => ErrorCode::NoTactus,
             Self::NotStopped { .. } => ErrorCode::NotStopped,
             Self::Interrupted | Self::Left => ErrorCode::Interrupted,
         }
+    }
+
+    /// A request that nobody answered for so long, on a line on which so many bytes were none of a device.
+    pub(crate) fn unanswered(request: &'static str, after: Duration, strange: usize) -> Self {
+        if strange > 0 { Self::Strange { bytes: strange } } else { Self::NoAnswer { request, after } }
     }
 
     /// The error as the failure of a command that was `doing` something.

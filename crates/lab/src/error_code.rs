@@ -392,6 +392,8 @@ error_codes! {
         "check bit rate, termination (120 ohm at both ends) and wiring, then switch the interface off and on";
     FramesNotSent = 705: "frames do not leave the CAN interface", "nobody on the bus acknowledges them",
         "check that the device has power and that its bit rate is the same";
+    NoTactus = 706: "something else than a device is at the line", "another port, another bit rate, or a board without the firmware",
+        "name the port of the board (`ls /dev/serial/by-id`) at 921600 baud, and flash the firmware with `tactus flash`";
 }
 
 impl ErrorCode {

@@ -103,6 +103,8 @@ pub struct Client<T: Transport> {
     sequence: u16,
     device_ms: u32,
     heard: Duration,
+    /// Bytes that came in, whatever they are.
+    heard_bytes: usize,
     /// Time for which this host has listened at all: one that was suspended, or at work elsewhere, has not.
     listened: Duration,
     /// The same when it last heard of the device.
@@ -156,6 +158,7 @@ impl<T: Transport> Client<T> {
             sequence: 0,
             device_ms: 0,
             heard: now,
+            heard_bytes: 0,
             listened: Duration::ZERO,
             listened_before: Duration::ZERO,
             sent: now,
@@ -379,7 +382,8 @@ impl<T: Transport> Client<T> {
             let now = self.transport.now();
             let deadline = started + timeout;
             if now >= deadline {
-                return Err(HostError::NoAnswer { request: request.name(), after: timeout });
+                let strange = if self.counters().accepted == 0 { self.heard_bytes } else { 0 };
+                return Err(HostError::unanswered(request.name(), timeout, strange));
             }
             if now >= repeat_at {
                 self.round_trips.repeated += 1;
@@ -427,6 +431,7 @@ impl<T: Transport> Client<T> {
         // A wait shorter than the step of a virtual clock would not let its time pass at all.
         let received = self.transport.receive(timeout.max(Duration::from_micros(10)), &mut bytes);
         self.listened += self.transport.now().saturating_sub(begun).min(timeout + LATE);
+        self.heard_bytes += bytes.len();
         let mut rest = bytes.as_slice();
         while let Some(frame) = self.decoder.next::<Reply>(&mut rest) {
             // What the device says to others carries numbers of the same series.

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use control::State;
 use lab::client::{Client, UploadOutcome};
 use lab::error::HostError;
-use lab::transport::{SerialTransport, Transport as _};
+use lab::transport::{SerialTransport, Transport, TransportError};
 use serialport::{SerialPort as _, TTYPort};
 
 use super::fixture::{Device, STEP, image};
@@ -99,6 +99,44 @@ fn a_serial_port_that_another_program_uses_is_told_from_one_that_is_not_there() 
     drop(board.pull());
     let missing = HostError::from(SerialTransport::open(&path, 921_600).err().expect("is gone"));
     assert_eq!(missing.code().to_string(), "E301");
+}
+
+/// The console of another board.
+struct Console(Duration);
+
+impl Transport for Console {
+    fn send(&mut self, _: &[u8]) -> Result<(), TransportError> {
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Duration, out: &mut Vec<u8>) -> Result<(), TransportError> {
+        out.extend(b"\r\nlogin: \0");
+        self.0 += timeout;
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        self.0
+    }
+
+    fn is_virtual(&self) -> bool {
+        true
+    }
+}
+
+/// The change that makes it fail: a line on which no message comes is one without an answer.
+#[test]
+fn the_console_of_another_board_is_told_from_a_board_that_is_silent() {
+    let console = || Console(Duration::ZERO);
+    let of = [
+        Client::connect(console(), "test").err(),
+        Client::observe(console(), "test").err(),
+        Client::halt(console(), "test").err(),
+    ];
+    for error in of {
+        let error = error.expect("it is no device");
+        assert_eq!((error.code().to_string(), error.code().exit() as u8), ("E706".to_owned(), 7), "{error}");
+    }
 }
 
 #[test]
