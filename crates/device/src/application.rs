@@ -237,6 +237,9 @@ pub trait Application {
     /// Why that cannot be told.
     fn listing(&self, place: u8) -> Result<Option<Listing>, Refused>;
 
+    /// Learns from the control half's health what it has forgotten since, before a host is told what it holds.
+    fn follow(&mut self, _health: &Health) {}
+
     /// Name of the primitive that the control half holds.
     fn loaded(&self) -> Option<&Name>;
 

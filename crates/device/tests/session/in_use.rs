@@ -1,6 +1,6 @@
 //! Which primitive the control half holds, as the status tells it, through every change of the store.
 
-use control::State;
+use control::{Payload, State};
 use device::storage::{Library, Opening};
 use link::{Name, Reply, Request, RunOptions};
 
@@ -84,4 +84,31 @@ fn the_weight_of_the_links_is_handed_over_once() {
     rig.store("push", &image("push", 3.0, 10));
     (0..5).for_each(|_| rig.poll());
     assert_eq!(rig.bench.weights.len(), 1);
+}
+
+/// The start-up has found another tool: the control half forgets what was checked for the old one, without a word.
+#[test]
+fn what_the_control_half_has_forgotten_is_in_use_no_longer() {
+    let mut rig = Rig::greeted();
+    rig.store("reach", &image("reach", 3.0, 10));
+    (rig.bench.payload, rig.bench.primitive) = (Payload::None, None);
+    let Some(Reply::Listing { listing: Some(listing), .. }) = rig.ask(Request::List { index: 0 }) else { panic!() };
+    assert!(!listing.loaded);
+    assert_eq!(in_use(&mut rig), None);
+}
+
+/// The image that runs has been replaced, so that its name may go; it is told as long as it runs.
+#[test]
+fn a_name_that_goes_while_an_older_image_of_it_runs_is_in_use_until_the_run_is_over() {
+    for gone in [Request::Delete { name: name("reach") }, Request::Rename { name: name("reach"), to: name("grasp") }] {
+        let mut rig = Rig::greeted();
+        rig.store("reach", &image("reach", 3.0, 10));
+        rig.commanded(run("reach"));
+        rig.bench.state = State::Run;
+        rig.store("reach", &image("reach", 4.0, 10));
+        rig.done(gone);
+        assert_eq!(in_use(&mut rig).as_deref(), Some("reach"));
+        rig.bench.state = State::Hold;
+        assert_eq!(in_use(&mut rig), None, "there is none of this name");
+    }
 }

@@ -93,7 +93,10 @@ impl<S: Store> ArmApplication<S> {
             self.model = ArmModel::new(health.payload);
             self.loaded = None;
         }
-        if !health.has_primitive {
+        // What runs may have been replaced, and then lost its name: afterwards nobody can run it by that.
+        let runs = matches!(health.state, State::Run | State::Coast);
+        let is_gone = |loaded: &Entry| !runs && self.directory.find(&loaded.name).is_none();
+        if !health.has_primitive || self.loaded.as_ref().is_some_and(is_gone) {
             self.loaded = None;
         }
     }
@@ -255,6 +258,10 @@ impl<S: Store> Application for ArmApplication<S> {
             let loaded = self.loaded.as_ref().is_some_and(|loaded| loaded.is_same(entry));
             entry.listing(place, loaded)
         }))
+    }
+
+    fn follow(&mut self, health: &Health) {
+        self.follow_arm(health);
     }
 
     fn loaded(&self) -> Option<&Name> {

@@ -134,7 +134,7 @@ impl<A: Application> HostSession<A> {
             Request::Ping => {}
             Request::Status => return Ok(Some(Reply::Status { of, status: self.status(port) })),
             Request::Statistics => return Ok(Some(Reply::Statistics { of, statistics: self.statistics(port) })),
-            Request::List { index } => return self.listing(of, index).map(Some),
+            Request::List { index } => return self.listing(of, index, port).map(Some),
             Request::Telemetry { every } => self.telemetry_every = every,
             Request::UploadBegin { name, length, crc } => self.upload_begin(name, length, crc)?,
             Request::UploadChunk { offset, data } => self.upload_chunk(offset, &data)?,
@@ -197,7 +197,7 @@ impl<A: Application> HostSession<A> {
             Request::Telemetry { every } => self.observers.set_telemetry(session, every),
             Request::Status => return Ok(Reply::Status { of, status: self.status(port) }),
             Request::Statistics => return Ok(Reply::Statistics { of, statistics: self.statistics(port) }),
-            Request::List { index } => return self.listing(of, index),
+            Request::List { index } => return self.listing(of, index, port),
             Request::FaultRecord | Request::FaultCycle { .. } => return Ok(fault_record(of, &request, port)),
             Request::Owner => return Ok(self.owner_report(now_ms, of)),
             Request::Secret => return self.secret_report(of, false),
@@ -218,7 +218,8 @@ impl<A: Application> HostSession<A> {
         Reply::Owner { of, owner: self.owner.as_ref().map(|owner| owner.report(now_ms)) }
     }
 
-    fn listing(&self, of: u16, index: u8) -> Result<Reply, Refused> {
+    fn listing(&mut self, of: u16, index: u8, port: &mut impl SessionPort<A::Controller>) -> Result<Reply, Refused> {
+        self.application.follow(&port.health());
         let places = self.application.places();
         let listing = self.application.listing(index)?;
         if index < places {
@@ -281,8 +282,9 @@ impl<A: Application> HostSession<A> {
         }
     }
 
-    fn status(&self, port: &mut impl SessionPort<A::Controller>) -> Status {
+    fn status(&mut self, port: &mut impl SessionPort<A::Controller>) -> Status {
         let health = port.health();
+        self.application.follow(&health);
         let latest = self.latest.map(|timed| timed.record.telemetry()).unwrap_or_default();
         Status {
             cycle: health.cycle as u32,
