@@ -90,7 +90,8 @@ fn cli_2_a_fault_of_a_run_is_told_unprompted_and_its_last_second_can_be_read_bef
     assert_eq!(std::fs::read(folder.join("fault.csv")).unwrap(), before);
 
     // Cleared, and the arm runs again: the record is still that of the fault.
-    assert!(tactus(folder, "stop --clear-fault").status.success());
+    let stopped = object(folder, "stop --clear-fault");
+    assert_eq!((&stopped["state"], &stopped["fault"]), (&State::Gravity.name().into(), &1.into()), "{stopped}");
     let again = tactus(folder, "run reach.toml --non-interactive");
     assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
     let later = object(folder, "faults");

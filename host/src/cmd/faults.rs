@@ -44,8 +44,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let file = command.record.as_deref().map(|path| files::create(path, global, &[], DOING)).transpose()?;
     let mut client = connection::observe(global, DOING)?;
-    let status = client.status().map_err(|error| error.into_failure(DOING))?;
+    // Reading it takes a second: what is told as present is what is latched behind that.
     let last = client.last_second().map_err(|error| error.into_failure(DOING))?;
+    let status = client.status().map_err(|error| error.into_failure(DOING))?;
     if let Some(file) = file {
         let Some(LastSecond { cycles, .. }) = &last else {
             let failure = Failure::new(ErrorCode::NoFaultRecord, DOING, "there is nothing to write");
@@ -65,7 +66,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 }
 
 fn text(status: &Status, last: Option<&LastSecond>) -> String {
-    let mut text = match fault_text(status.fault) {
+    let present = fault_text(status.fault);
+    let mut text = match &present {
         Some(fault) => format!("present fault: {fault}"),
         None => "present fault: none\n".to_owned(),
     };
@@ -75,6 +77,10 @@ fn text(status: &Status, last: Option<&LastSecond>) -> String {
     };
     text += &match fault_text(last.record.fault) {
         Some(_) if last.record.fault == status.fault => "last second before it:\n".to_owned(),
+        // A loss that goes on gets another name; its record ends with its first cycles.
+        Some(_) if last.record.latched && present.is_some() => {
+            format!("it began as {}; the last second before that:\n", fault_name(last.record.fault))
+        }
         Some(fault) => format!("last fault, cleared: {fault}"),
         None => "last fault: none; the device restarted, and this is the second before\n".to_owned(),
     };
@@ -93,6 +99,10 @@ fn fault_text(code: u8) -> Option<String> {
         "{fault:?}: {fault}\n  the arm: {reaction}\n  usual cause: {cause}\n  check: {check}\n  to go on: {clear}\n"
     );
     (fault != Fault::None).then_some(words)
+}
+
+fn fault_name(code: u8) -> String {
+    Fault::from_code(code).map_or_else(|| code.to_string(), |fault| format!("{fault:?}"))
 }
 
 fn pendant(status: &Status) -> Option<PendantState> {
@@ -150,4 +160,25 @@ fn largest(values: &[f32; 7]) -> String {
     let size = |value: f32| if value.is_nan() { f32::INFINITY } else { value.abs() };
     let joint = (0..7).max_by(|a, b| size(values[*a]).total_cmp(&size(values[*b]))).unwrap_or(0);
     format!("J{} {:.2}", joint + 1, values[joint])
+}
+
+#[cfg(test)]
+mod tests {
+    use link::FaultRecord;
+
+    use super::*;
+
+    /// A loss that goes on has another name than its first cycles, with which the record ends.
+    #[test]
+    fn a_loss_that_goes_on_is_not_said_to_be_a_fault_that_was_cleared() {
+        let told = |now: Fault, latched: bool| {
+            let record = FaultRecord { number: 1, fault: Fault::RepliesLost.code(), latched, cycles: 0 };
+            let last = LastSecond { record, cycles: Vec::new() };
+            text(&Status { fault: now.code(), ..Status::default() }, Some(&last))
+        };
+        let on = told(Fault::RepliesLostForLong, true);
+        assert!(on.contains("it began as RepliesLost;") && !on.contains("cleared"), "{on}");
+        assert!(told(Fault::RepliesLost, true).contains("last second before it"));
+        assert!(told(Fault::None, false).contains("last fault, cleared: RepliesLost:"));
+    }
 }

@@ -40,13 +40,15 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 
 fn report(mut client: Client<Device>, command: &Cmd, global: &Global) -> Result<(), Failure> {
     client.stop().map_err(|error| connection::refused(&mut client, error, DOING))?;
-    let status = client.status().map_err(|error| error.into_failure(DOING))?;
-    let state = State::from_code(status.state).map_or("unknown", State::name);
+    let mut status = client.status().map_err(|error| error.into_failure(DOING))?;
     let latched = Fault::from_code(status.fault).filter(|fault| *fault != Fault::None);
     let cleared = command.clear_fault && latched.is_some();
+    let fault = status.fault;
     if cleared {
         client.clear_fault().map_err(|error| connection::refused(&mut client, error, DOING))?;
+        status = client.status().map_err(|error| error.into_failure(DOING))?;
     }
+    let state = State::from_code(status.state).map_or("unknown", State::name);
     let mut text = format!("stopped; state: {state}");
     if let Some(fault) = latched {
         text.push_str(&format!("\n{}: {fault}", if cleared { "cleared" } else { "fault" }));
@@ -54,7 +56,7 @@ fn report(mut client: Client<Device>, command: &Cmd, global: &Global) -> Result<
             global.output().say("when its cause is removed: `tactus stop --clear-fault`");
         }
     }
-    let data = Stopped { state: Some(state.to_owned()), fault: Some(status.fault), cleared, others: false };
+    let data = Stopped { state: Some(state.to_owned()), fault: Some(fault), cleared, others: false };
     global.output().result(&data, text)
 }
 
@@ -63,7 +65,7 @@ fn report(mut client: Client<Device>, command: &Cmd, global: &Global) -> Result<
 pub struct Stopped {
     /// State of the supervisor afterwards; null where another host keeps the arm.
     pub state: Option<String>,
-    /// Code of the fault, 0 for none; null where another host keeps the arm.
+    /// Code of the fault that is or was latched, 0 for none; null where another host keeps the arm.
     pub fault: Option<u8>,
     /// True if a fault was cleared.
     pub cleared: bool,
