@@ -99,12 +99,17 @@ fn g4_a_digit_that_was_missing_at_the_start_up_brings_the_hand_back_once_it_answ
         let faults =
             bus.events.iter().filter(|event| matches!(event, EventKind::Entered(_, fault) if *fault != Fault::None));
         assert_eq!(faults.count(), 0, "{:?}", bus.events);
-        bus.press_activate();
-        bus.run_until(&mut core, Stage::Ready);
-        bus.commands.extend([Control::Hold.into(), Command::InitialiseHand]);
-        bus.run(&mut core, 8.0);
-        assert_eq!((core.health().state, core.health().hand), (State::Hold, HandStage::Ready), "{:?}", bus.events);
+        holds_with_a_ready_hand_again(&mut core, &mut bus);
     }
+}
+
+/// A person activates the arm, has it hold and initialises its hand.
+fn holds_with_a_ready_hand_again(core: &mut DeviceController, bus: &mut Bus) {
+    bus.press_activate();
+    bus.run_until(core, Stage::Ready);
+    bus.commands.extend([Control::Hold.into(), Command::InitialiseHand]);
+    bus.run(core, 8.0);
+    assert_eq!((core.health().state, core.health().hand), (State::Hold, HandStage::Ready), "{:?}", bus.events);
 }
 
 /// A hand of three digits does not stop the arm, and neither does the fourth: it weighs what it weighed. The change
@@ -143,11 +148,7 @@ fn g2_a_hand_that_lost_a_puck_in_the_loop_is_woken_and_initialised_once_the_arm_
         bus.run(&mut core, 0.5);
         bus.run_until(&mut core, Stage::WaitingForActive);
         assert_eq!((core.health().hand, core.health().zeroed), (HandStage::NotInitialised, true), "{:?}", bus.events);
-        bus.press_activate();
-        bus.run_until(&mut core, Stage::Ready);
-        bus.commands.extend([Control::Hold.into(), Command::InitialiseHand]);
-        bus.run(&mut core, 8.0);
-        assert_eq!((core.health().state, core.health().hand), (State::Hold, HandStage::Ready), "{:?}", bus.events);
+        holds_with_a_ready_hand_again(&mut core, &mut bus);
     }
 }
 
