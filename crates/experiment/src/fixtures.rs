@@ -55,6 +55,7 @@ pub fn results(seeds: &[u64]) -> Results {
                         tilt_deg: if held { 4.0 } else { 80.0 },
                         push_m: 0.01 * chance,
                         touch_s: Some(5.0),
+                        touch_speed_m_s: Some(0.034),
                         closing_s: Some(8.2),
                         lift_s: 12.5,
                         failure_s: (!held).then_some(6.0 + chance),

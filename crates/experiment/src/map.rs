@@ -119,6 +119,9 @@ pub fn table(summaries: &[Summary]) -> String {
     row("largest adaptation", &|s| {
         or_none(s.adaptation_m.zip(s.adaptation_deg), |(m, degrees)| format!("{:.1} cm  {degrees:.1} deg", m * 100.0))
     });
+    row("hand at the first touch, median, max", &|s| {
+        or_none(s.touch_speed_m_s, |speed| format!("{:.1} cm/s  {:.1} cm/s", speed.median * 1e2, speed.max * 1e2))
+    });
     row("peak force before closing, median, max", &|s| newtons(s.contact_peak_n));
     if summaries.iter().any(|summary| summary.below_tipping.is_some()) {
         row("trials below the tipping force", &|s| or_none(s.below_tipping, |share| format!("{:.0} %", share * 100.0)));

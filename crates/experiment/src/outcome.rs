@@ -33,6 +33,9 @@ const SUSTAINED: f64 = 0.1;
 /// Time over which the force of a finger is averaged, s.
 const GRIP: f64 = 0.05;
 
+/// Time over which the speed of a hand that arrives is averaged, s.
+const ARRIVAL: f64 = 0.2;
+
 /// The outcome of a trial.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "outcome", content = "fault", rename_all = "snake_case")]
@@ -120,6 +123,10 @@ pub struct Measures {
     pub push_m: f64,
     /// First touch of the object.
     pub touch_s: Option<f64>,
+    /// Horizontal speed of the hand over the 0.2 s before that, m/s; `None` where the fingers begin to close first. A
+    /// movement has the mean speed of what was shown, and the object feels that of the moment.
+    #[serde(default)]
+    pub touch_speed_m_s: Option<f64>,
     /// The fingers began to close; `None` where they never did.
     pub closing_s: Option<f64>,
     /// The arm began to lift.
@@ -278,6 +285,7 @@ pub fn judge(
         tilt_deg: tilt.to_degrees(),
         push_m: before.last().map_or(0.0, moved),
         touch_s: first_time(&|sample| sample.contact.touches()),
+        touch_speed_m_s: touch_speed(before),
         closing_s: closing.map(|time| time - marks.run),
         lift_s: marks.lift - marks.run,
         failure_s,
@@ -303,6 +311,15 @@ fn is_lifted(sample: &Sample, first: &Sample) -> bool {
 fn is_grasped(sample: &Sample) -> bool {
     let fingers = sample.contact.fingers.iter().filter(|force| **force > TOUCH).count();
     fingers + usize::from(sample.contact.palm > TOUCH) >= 2
+}
+
+/// Horizontal speed of the hand over the [`ARRIVAL`] before the first touch, m/s; `None` without one, or without that
+/// time before it.
+fn touch_speed(samples: &[Sample]) -> Option<f64> {
+    let steps = (ARRIVAL / SAMPLE_SECONDS).round() as usize;
+    let last = samples.iter().position(|sample| sample.contact.touches())?.checked_sub(1)?;
+    let (first, last) = (samples.get(last.checked_sub(steps)?)?, samples.get(last)?);
+    Some((last.hand[0] - first.hand[0]).hypot(last.hand[1] - first.hand[1]) / (last.time - first.time))
 }
 
 /// Mean of forces; `None` of none.
@@ -370,6 +387,26 @@ mod tests {
         // The fingers have moved 0.05 rad a tenth of a second after they began.
         assert!((measures.closing_s.unwrap() - 8.1).abs() < 0.02, "{:?}", measures.closing_s);
         assert_eq!((measures.failure_s, measures.lift_s), (None, 12.0));
+    }
+
+    /// The change that makes it fail: the speed is that of the whole way, or goes on beyond the touch.
+    #[test]
+    fn the_speed_of_a_touch_is_that_of_the_moment_and_not_of_the_whole_way() {
+        let mut observation = good();
+        // At 3 cm/s until half a second before the touch, then at 7 cm/s along a diagonal, then standing.
+        for sample in &mut observation.samples {
+            let way = 0.03 * sample.time.min(5.5) + 0.07 * (sample.time - 5.5).clamp(0.0, 0.5);
+            sample.hand = [0.6 * way, 0.8 * way, sample.hand[2]];
+        }
+        let speed = |observation: &Observation| {
+            judge(observation, &MILESTONES, UPRIGHT, ArmConduct::default()).1.touch_speed_m_s
+        };
+        assert!((speed(&observation).unwrap() - 0.07).abs() < 1e-3, "{:?}", speed(&observation));
+        // What is touched only by the closing fingers was not arrived at, and what is touched at once from nowhere.
+        observation.samples.iter_mut().filter(|sample| sample.time < 9.5).for_each(|s| s.contact = Contact::default());
+        assert_eq!(speed(&observation), None);
+        observation.samples.retain(|sample| sample.time >= 9.5);
+        assert_eq!(speed(&observation), None);
     }
 
     #[test]

@@ -172,7 +172,7 @@ impl Results {
 type Column = (&'static str, fn(&Report) -> String);
 
 /// All columns of `results.csv`.
-const COLUMNS: [Column; 39] = [
+const COLUMNS: [Column; 40] = [
     ("cell", |r| r.key.index.to_string()),
     ("along_m", |r| number(r.key.cell.along())),
     ("sideways_m", |r| number(r.key.cell.sideways())),
@@ -205,6 +205,7 @@ const COLUMNS: [Column; 39] = [
     ("free_sag_m", |r| optional(r.free_sag_m)),
     ("shaking_rad_s", |r| number(r.measures.shaking_rad_s)),
     ("touch_s", |r| optional(r.measures.touch_s)),
+    ("touch_speed_m_s", |r| optional(r.measures.touch_speed_m_s)),
     ("closing_s", |r| optional(r.measures.closing_s)),
     ("lift_s", |r| number(r.measures.lift_s)),
     ("failure_s", |r| optional(r.measures.failure_s)),

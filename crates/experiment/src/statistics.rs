@@ -151,6 +151,8 @@ pub struct Summary {
     pub adaptation_m: Option<f64>,
     /// Largest adaptation of a trial that succeeded, degrees.
     pub adaptation_deg: Option<f64>,
+    /// Horizontal speed of the hand just before its first touch, m/s, of those that touch before the fingers close.
+    pub touch_speed_m_s: Option<Spread>,
     /// Peak force on the object before the fingers close, N.
     pub contact_peak_n: Option<Spread>,
     /// Share of the trials in which that peak, averaged over 100 ms, stays below the tipping force, and the arm does
@@ -219,6 +221,7 @@ impl Summary {
             farthest_success_m: farthest.reduce(f64::max),
             adaptation_m: successes().map(|report| report.adaptation_m).reduce(f64::max),
             adaptation_deg: successes().map(|report| report.adaptation_deg).reduce(f64::max),
+            touch_speed_m_s: measured(|report| report.measures.touch_speed_m_s),
             contact_peak_n: spread(|report| report.measures.contact_peak_n),
             below_tipping: tipping.map(|limit| {
                 let gentle = went_on().filter(|report| report.measures.contact_sustained_n < limit);
