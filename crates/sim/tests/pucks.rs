@@ -9,7 +9,7 @@ use sim::{
     TICKS_PER_MILLISECOND,
 };
 
-use crate::common::{Master, home_counts, motor_id, safety_id};
+use crate::common::{Master, counts_at, home_counts, motor_id, safety_id};
 
 fn awake() -> Master {
     let mut master = Master::new(PlantConfig::default());
@@ -111,6 +111,7 @@ fn the_first_reply_starts_75_us_after_the_request() {
 #[test]
 fn all_pucks_latch_at_the_same_instant() {
     // Joint 3 turns M2 and M3 equally, M3's reply leaves 80 us later: sampled at different times they would differ.
+    // Joint 2, which is thrown back by joint 3, turns them against each other.
     let mut master = weightless();
     master.activate_unzeroed();
     let torque = PuckTorque::new(-500).unwrap();
@@ -121,11 +122,17 @@ fn all_pucks_latch_at_the_same_instant() {
     assert!(speed > 5.0, "the joint must move fast enough to tell: {speed} rad/s");
     let mut largest = 0;
     for _ in 0..20 {
+        let apart = |master: &mut Master| {
+            let [_, second, third, ..] = counts_at(&master.plant.world().joint_positions());
+            second.0 - third.0
+        };
+        let before = apart(&mut master);
         let [_, Some(second), Some(third), ..] = master.positions() else { panic!("pucks 2 and 3 answer") };
-        largest = largest.max((second.0 - third.0).abs());
+        let (read, after) = (second.0 - third.0, apart(&mut master));
+        largest = largest.max(before.min(after) - read).max(read - before.max(after));
         master.wait_ms(1);
     }
-    assert!(largest <= 1, "{largest} counts apart");
+    assert!(largest <= 1, "{largest} counts farther apart than at any one moment");
 }
 
 #[test]
@@ -153,7 +160,10 @@ fn the_encoder_moves_between_two_steps_of_physics() {
 
 #[test]
 fn the_position_that_is_set_is_read_back_and_moves_with_the_joint() {
-    let mut master = awake();
+    let mut master = Master::new(PlantConfig::default());
+    // Time for the hands that hold the arm to come to rest: counts begin where the pucks wake up.
+    master.wait_ms(500);
+    master.wake();
     assert_near(master.positions(), [Counts(0); 7]);
     master.zero();
     assert_near(master.positions(), home_counts());
@@ -232,12 +242,13 @@ fn torque_has_the_sign_of_the_transmission_and_persists() {
     master.activate_unzeroed();
     // -1 N m at M1 is +42 N m at J1: M1 turns against J1. Only one frame is sent.
     master.send(torques(-100));
-    master.wait_ms(100);
+    master.wait_ms(50);
     let early = master.plant.world().joint_velocities()[0];
-    master.wait_ms(100);
+    master.wait_ms(50);
     let late = master.plant.world().joint_velocities()[0];
-    // 100/2472 N m x 42 = 1.70 N m on about 1.61 kg m^2.
-    assert!((early - 0.105).abs() < 0.01, "{early} rad/s after 0.1 s");
+    // 100/2472 N m x 42 = 1.70 N m on about 0.36 kg m^2: the arm stands straight up, and what is beyond J3 does not
+    // turn with it.
+    assert!((early - 0.224).abs() < 0.01, "{early} rad/s after 0.05 s");
     assert!(late > 1.7 * early, "the torque persists: {early} then {late} rad/s");
     assert_eq!(master.motor_value(Node::ARM[0], Property::T), Some(-100));
 }

@@ -188,7 +188,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             Law::Lower(lowering) => {
                 let hand = sqrt(twist.fixed_rows::<3>(0).norm_squared());
                 lowering.step(hand, measured.state.dq.0.amax());
-                lowering.support.step(sinking, borne, R::constant(SINKING_SPEED));
+                // As long as gravity is carried, what sinks is a load that a hold has borne.
+                let allowed = R::constant(SINKING_SPEED) * (R::constant(1.0) - lowering.share);
+                lowering.support.step(sinking, borne, allowed);
                 (lowering.rest.step(), lowering.share, &mut lowering.support)
             }
             _ => return self.float(measured),

@@ -67,7 +67,7 @@ pub enum Engine {
 /// Which physics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WorldKind {
-    /// Decoupled joints in pure Rust: for tests and speed, not for tracking figures.
+    /// The arm as rigid bodies in pure Rust, with nothing around it.
     Simple,
     /// MuJoCo with the whole arm, a table and a flashlight.
     Mujoco,

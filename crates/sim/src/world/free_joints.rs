@@ -1,16 +1,13 @@
-//! A small pure-Rust world: the WAM with its true statics and seven decoupled joints.
+//! A small pure-Rust world: the WAM as rigid bodies, with nothing to touch.
 //!
-//! Simplified on purpose, so that unit tests and runs without MuJoCo need no physics engine. **True**: kinematics, the
-//! gravity torque of every link and of the hand, the torque of a push at the grasp point, joint stops, viscous and
-//! Coulomb friction. **Simplified**: the mass matrix is a constant diagonal (reflected rotor inertia plus the mean of
-//! the link inertia over the arm's work space), hence no coupling and no Coriolis torque; the hand is rigid and the
-//! wrist wrench is quasi-static; there is nothing to touch but springs in the way of the fingers ([`FingerObstacle`]),
-//! whose links are where their drives hold them otherwise, without inertia. Do not judge a controller's tracking by it.
-//!
-//! `v = (I v + h tau) / (I + h b)`, then Coulomb friction takes at most `h c / (I + h b)` from `|v|` and never turns
-//! its sign, so that a joint at rest stays at rest whatever the step: `I` inertia, `b` viscous, `c` Coulomb friction,
-//! `h` step.
+//! For unit tests and for runs without MuJoCo. **True**: kinematics, mass matrix, Coriolis torques and gravity of every
+//! link and of the hand with its fingers half closed, the torque of a push at the grasp point, viscous and dry friction
+//! of coupled joints, sticking included, inelastic joint stops. **Simplified**: cables are rigid; the hand is rigid,
+//! what it holds is a point, and the wrist wrench is quasi-static: the sensor does not feel the inertia of the hand.
+//! There is nothing to touch but springs in the way of the fingers ([`FingerObstacle`]), whose links are where their
+//! drives hold them otherwise, without inertia.
 
+use super::rigid_bodies::{Body, Dynamics};
 use super::{ARM_STREAM, HandState, HandTargets, Held, Pose, World};
 use crate::Noise;
 use crate::chain::{self, Frame, Vector, add, dot, subtract};
@@ -20,19 +17,37 @@ use crate::time::STEP_SECONDS;
 /// Gravity, m/s^2, world frame (the value of the golden vectors).
 const GRAVITY: Vector = [0.0, 0.0, -9.81];
 
-/// Mass (kg) and centre of mass in frame j (m) of each link, `wam7.toml` `[[arm.link]]`.
-const LINKS: [(f64, Vector); 7] = [
-    (10.7677, [-0.00443, 0.12189, -0.00066]),
-    (3.8749, [-0.00237, 0.03106, 0.01542]),
-    (1.8023, [-0.03826, 0.20751, 3e-05]),
-    (2.17266212, [0.00553408, 6.822e-05, 0.11927695]),
-    (0.35655692, [5.483e-05, 0.02886286, 0.00148493]),
-    (0.40915886, [-5.923e-05, -0.01686123, 0.02419052]),
-    (0.0754827, [0.00014836, 7.252e-05, -0.00335185]),
+/// Mass (kg), centre of mass in frame j (m) and inertia about it (kg m^2) of each link, `wam7.toml` `[[arm.link]]`.
+const LINKS: [(f64, Vector, [f64; 6]); 7] = [
+    (10.7677, [-0.00443, 0.12189, -0.00066], [0.13488033, 0.11328369, 0.0904633, 0.00213041, 0.00012485, -0.00068555]),
+    (3.8749, [-0.00237, 0.03106, 0.01542], [0.02140958, 0.01377875, 0.01558906, -0.00027172, -2.461e-05, 0.0018192]),
+    (1.8023, [-0.03826, 0.20751, 3e-05], [0.05911077, 0.0032455, 0.05927043, 0.00249612, -7.38e-06, 1.767e-05]),
+    (
+        2.17266212,
+        [0.00553408, 6.822e-05, 0.11927695],
+        [0.01067491, 0.01058659, 0.00282036, -4.503e-05, 0.00135557, 0.00011002],
+    ),
+    (0.35655692, [5.483e-05, 0.02886286, 0.00148493], [0.00037112, 0.00019434, 0.00038209, 8e-08, 3e-08, 1.613e-05]),
+    (
+        0.40915886,
+        [-5.923e-05, -0.01686123, 0.02419052],
+        [0.00054889, 0.00023846, 0.00045133, -1.9e-07, 1e-07, 4.43e-05],
+    ),
+    (0.0754827, [0.00014836, 7.252e-05, -0.00335185], [3.911e-05, 3.877e-05, 7.614e-05, -1.9e-07, 0.0, 0.0]),
 ];
 
 /// Force/torque sensor and hand together: mass (kg), centre of mass in frame 7 (m), `[payload.wam7_bh280_ft]`.
 const PAYLOAD: (f64, Vector) = (1.337308, [-6.029705722242e-05, -0.009027260457134806, 0.0673508537777823]);
+
+/// Its inertia about that centre, axes of frame 7, kg m^2.
+const PAYLOAD_INERTIA: [f64; 6] = [
+    0.004898018820238933,
+    0.0033387995622981836,
+    0.002820807058958497,
+    -8.633785350111146e-06,
+    8.561979507244731e-07,
+    0.0004391319639121204,
+];
 
 /// Load of the sensor: the hand alone, mass (kg), centre of mass in frame 7 (m) = hand frame turned by pi, 12 mm out.
 const HAND: (f64, Vector) = (1.201308, [-6.71232831213989e-05, -0.010049236022244114, 0.074296379915774]);
@@ -40,18 +55,11 @@ const HAND: (f64, Vector) = (1.201308, [-6.71232831213989e-05, -0.01004923602224
 /// Where the sensor measures, frame 7, m (`[ft_sensor] origin_in_frame7`); its axes are those of frame 7.
 const SENSOR_ORIGIN: Vector = [0.0, 0.0, 0.006];
 
-/// Rotor inertia reflected to the joints, kg m^2 (`reflected_diag`), plus the mean diagonal of the link mass matrix
-/// with sensor and hand over the 100 states of `tests/vectors/dyn_wam7_bh280_ft.csv`.
-const INERTIA: [f64; 7] = [
-    0.20517084 + MEAN_LINK_INERTIA[0],
-    0.18883754875 + MEAN_LINK_INERTIA[1],
-    0.066906917344 + MEAN_LINK_INERTIA[2],
-    0.03462264 + MEAN_LINK_INERTIA[3],
-    0.003227287 + MEAN_LINK_INERTIA[4],
-    0.003227287 + MEAN_LINK_INERTIA[5],
-    0.000316524958 + MEAN_LINK_INERTIA[6],
-];
-const MEAN_LINK_INERTIA: [f64; 7] = [1.4071, 2.1873, 0.1938, 0.3301, 0.0158, 0.0269, 0.003];
+/// Rotor inertia reflected to the joints, kg m^2 (`reflected_diag`), and the pair of J5 and J6 that one pair of motors
+/// turns (`reflected_j5_j6`).
+const ROTORS: [f64; 7] =
+    [0.20517084, 0.18883754875, 0.066906917344, 0.03462264, 0.003227287, 0.003227287, 0.000316524958];
+const ROTORS_J5_J6: f64 = 5.6454e-05;
 
 /// Viscous friction, N m s/rad, `[arm.friction]`.
 const VISCOUS: [f64; 7] = [1.27163, 1.15061, 0.407672, 0.233564, 0.0159914, 0.0159914, 0.00267989];
@@ -84,7 +92,7 @@ impl FingerObstacle {
     pub const NOTHING: Self = Self { inner: f64::INFINITY, outer: f64::INFINITY, stiffness: 0.0 };
 }
 
-/// Seven decoupled joints with the WAM's statics.
+/// The WAM as rigid bodies in free space.
 #[derive(Clone, Debug)]
 pub struct FreeJoints {
     q: [f64; 7],
@@ -140,7 +148,7 @@ impl FreeJoints {
         self.with_factors(links, hand, friction)
     }
 
-    /// The same arm with this weight in its hand; only its weight counts, not its inertia.
+    /// The same arm with this weight in its hand, a point.
     #[must_use]
     pub fn with_held(self, held: Option<Held>) -> Self {
         Self { held, ..self }
@@ -182,6 +190,34 @@ impl FreeJoints {
         self.spread_push = torque;
     }
 
+    /// The equation of motion where the arm is; a body whose mass is another keeps its shape.
+    fn dynamics(&self, frames: &[Frame; 8]) -> Dynamics {
+        let (links, hand) = self.weights;
+        let held = self.held_body();
+        let bodies: [Body; 10] = std::array::from_fn(|part| match LINKS.get(part) {
+            Some((mass, centre, inertia)) => Body {
+                link: part,
+                mass: mass * links[part],
+                centre: *centre,
+                inertia: inertia.map(|entry| entry * links[part]),
+            },
+            None if part == LINKS.len() => {
+                Body { link: 6, mass: PAYLOAD.0, centre: PAYLOAD.1, inertia: PAYLOAD_INERTIA }
+            }
+            None if part == LINKS.len() + 1 => {
+                Body { link: 6, mass: HAND.0 * (hand - 1.0), centre: HAND.1, inertia: [0.0; 6] }
+            }
+            None => Body { link: 6, mass: held.0, centre: held.1, inertia: [0.0; 6] },
+        });
+        let mut dynamics = Dynamics::of(&bodies, frames, &self.dq);
+        for (joint, rotor) in ROTORS.into_iter().enumerate() {
+            dynamics.mass[joint][joint] += rotor;
+        }
+        dynamics.mass[4][5] += ROTORS_J5_J6;
+        dynamics.mass[5][4] += ROTORS_J5_J6;
+        dynamics
+    }
+
     /// Torque of gravity and of the push on each joint, N m, by the principle of virtual work.
     fn external_torques(&self, frames: &[Frame; 8]) -> [f64; 7] {
         let weight = |mass: f64| self.gravity.map(|g| g * mass);
@@ -190,7 +226,7 @@ impl FreeJoints {
         // Seven links, then sensor and hand, what the hand weighs more, what it holds, and the push: which link it acts
         // on, where, and the force.
         let forces: [(usize, Vector, Vector); 11] = std::array::from_fn(|part| match LINKS.get(part) {
-            Some((mass, centre)) => (part, frames[part + 1].point(*centre), weight(*mass * links[part])),
+            Some((mass, centre, _)) => (part, frames[part + 1].point(*centre), weight(*mass * links[part])),
             None if part == LINKS.len() => (6, frames[7].point(PAYLOAD.1), weight(PAYLOAD.0)),
             None if part == LINKS.len() + 1 => (6, frames[7].point(HAND.1), weight(HAND.0 * (hand - 1.0))),
             None if part == LINKS.len() + 2 => (6, frames[7].point(held.1), weight(held.0)),
@@ -217,18 +253,22 @@ impl World for FreeJoints {
     }
 
     fn step(&mut self, torques: &[f64; 7]) {
-        let external = self.external_torques(&chain::frames(&self.q));
-        for joint in 0..7 {
-            let inertia = INERTIA[joint] + STEP_SECONDS * VISCOUS[joint];
-            let driven =
-                (INERTIA[joint] * self.dq[joint] + STEP_SECONDS * (torques[joint] + external[joint])) / inertia;
-            let rubbed = STEP_SECONDS * self.coulomb[joint] / inertia;
-            let velocity = driven.signum() * (driven.abs() - rubbed).max(0.0);
-            let position = self.q[joint] + STEP_SECONDS * velocity;
+        let frames = chain::frames(&self.q);
+        let external = self.external_torques(&frames);
+        let applied = std::array::from_fn(|joint| torques[joint] + external[joint]);
+        let bounds = std::array::from_fn(|joint| {
             let (low, high) = STOPS[joint];
+            ((low - self.q[joint]) / STEP_SECONDS, (high - self.q[joint]) / STEP_SECONDS)
+        });
+        let dynamics = self.dynamics(&frames);
+        let speeds = dynamics.step(&self.dq, &applied, (&VISCOUS, &self.coulomb), &bounds);
+        for joint in 0..7 {
+            let (slowest, fastest) = bounds[joint];
             // Stops are inelastic: the joint rests against them until a torque takes it away.
-            self.q[joint] = position.clamp(low, high);
-            self.dq[joint] = if self.q[joint] == position { velocity } else { 0.0 };
+            let stopped = speeds[joint] <= slowest || speeds[joint] >= fastest;
+            let position = self.q[joint] + STEP_SECONDS * speeds[joint];
+            self.q[joint] = position.clamp(STOPS[joint].0, STOPS[joint].1);
+            self.dq[joint] = if stopped { 0.0 } else { speeds[joint] };
         }
     }
 
@@ -306,14 +346,46 @@ mod tests {
         }
     }
 
+    /// The change that makes it fail: no inertia of a link, one of its masses elsewhere, no Coriolis torque.
     #[test]
-    fn mean_inertia_is_that_of_the_golden_states() {
-        let rows = golden_rows();
-        for (joint, inertia) in MEAN_LINK_INERTIA.iter().enumerate() {
-            let name = format!("M{0}{0}", joint + 1);
-            let mean = rows.iter().map(|row| column(row, &name)).sum::<f64>() / rows.len() as f64;
-            assert!((mean - inertia).abs() < 1e-4, "{name}: {mean}");
+    fn mass_matrix_and_velocity_torques_are_the_golden_ones() {
+        let near = |value: f64, golden: f64| (value - golden).abs() < 1e-8 * golden.abs().max(1.0);
+        for row in golden_rows() {
+            let state = |name: &str| std::array::from_fn(|joint| column(&row, &format!("{name}{}", joint + 1)));
+            let (q, dq): ([f64; 7], [f64; 7]) = (state("q"), state("qd"));
+            let world = FreeJoints { q, dq, ..FreeJoints::new(HOME) };
+            let dynamics = world.dynamics(&chain::frames(&q));
+            for (a, reflected) in ROTORS.into_iter().enumerate() {
+                let velocity = column(&row, &format!("c{}", a + 1));
+                assert!(near(dynamics.velocity[a], velocity), "J{}: {} and {velocity}", a + 1, dynamics.velocity[a]);
+                for b in 0..7 {
+                    let rotor = if a == b { reflected } else { 0.0 };
+                    let pair = if (a, b) == (4, 5) || (a, b) == (5, 4) { ROTORS_J5_J6 } else { 0.0 };
+                    let links = dynamics.mass[a][b] - rotor - pair;
+                    let golden = column(&row, &format!("M{}{}", a + 1, b + 1));
+                    assert!(near(links, golden), "M{}{}: {links} and {golden}", a + 1, b + 1);
+                }
+            }
         }
+    }
+
+    /// The change that makes it fail: the torques of the velocities are left out, or have the wrong sign.
+    #[test]
+    fn an_arm_that_swings_freely_keeps_its_energy() {
+        let mut world = FreeJoints { dq: [1.0, -0.8, 0.6, 1.2, -2.0, 1.5, 3.0], ..FreeJoints::weightless([0.0; 7]) };
+        let mut rubbed = 0.0;
+        let energy = |world: &FreeJoints| {
+            let mass = world.dynamics(&chain::frames(&world.q)).mass;
+            (0..7).map(|a| (0..7).map(|b| 0.5 * mass[a][b] * world.dq[a] * world.dq[b]).sum::<f64>()).sum::<f64>()
+        };
+        let first = energy(&world);
+        for _ in 0..360 {
+            let before = world.dq;
+            world.step(&[0.0; 7]);
+            rubbed += (0..7).map(|j| STEP_SECONDS * VISCOUS[j] * before[j] * world.dq[j]).sum::<f64>();
+        }
+        let last = energy(&world);
+        assert!((last + rubbed - first).abs() < 0.01 * first && rubbed > 0.1 * first, "{first} {last} {rubbed}");
     }
 
     #[test]

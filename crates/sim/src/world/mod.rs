@@ -11,6 +11,7 @@ mod held;
 pub mod mujoco;
 mod object;
 mod object_file;
+mod rigid_bodies;
 
 pub use free_joints::{FingerObstacle, FreeJoints, HOME};
 pub use held::{Held, NotHeld};
