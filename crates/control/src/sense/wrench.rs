@@ -287,7 +287,7 @@ impl<R: Real> WrenchEstimator<R> {
             frames.tool_to_world() * (measured.torque - expected.torque) - frames.tool_to_sensor().cross(&force);
         let (force, torque) = (to_world.tr_mul(&force), to_world.tr_mul(&torque));
         let change = Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
-        drift.feel(&change, has_ended);
+        drift.feel(&change, has_ended, deviation.is_some());
         if deviation.is_some() && drift.is_free() {
             self.tare += drift.follow(&change);
         }
