@@ -191,3 +191,39 @@ fn a_change_of_speed_at_which_the_expectation_is_not_believed_is_told_before_the
     let stiff = succeeds(at, &format!("{DEVICE} --non-interactive run reach.toml --dry-run --speed-at 1:0.5"));
     assert!(!stiff.contains("derated"), "a run that does not look at forces: {stiff}");
 }
+
+/// Speed of elbow or forearm of this movement (m/s), and the warnings about it.
+fn warned(folder: &Path, options: &str) -> (f64, Vec<String>) {
+    let told: Value =
+        serde_json::from_slice(&tool::succeeds(folder, &format!("--json check reach.toml {options}")).stdout).unwrap();
+    let margins = told["margins"].as_array().unwrap();
+    let speed = margins.iter().find(|margin| margin["limit"] == "tip_speed").unwrap()["value"].as_f64().unwrap();
+    (speed, told["warnings"].as_array().unwrap().iter().map(|words| words.as_str().unwrap().to_owned()).collect())
+}
+
+/// One in four of random movements that a check passed could not be rehearsed: the pendant warned of its speed, the run
+/// was held to half, and the refusal spoke of recordings of another speed. Nobody was told of a run that was held back.
+///
+/// The changes that make it fail: a check does not look at the speed that the pendant warns of; a recording that took
+/// longer because it was held back is one of another speed; a run does not tell that it was held back.
+#[test]
+fn a_movement_that_the_pendant_will_warn_of_is_told_before_with_the_speed_that_mends_it() {
+    let folder = learned(1.6);
+    let at = folder.path();
+    let (fast, warnings) = warned(at, "");
+    assert!(fast > 0.55 && warnings.len() == 1, "{fast} m/s: {warnings:?}");
+    let told = "from 0.5 m/s on the pendant warns, and while it does the run is held to half of the taught speed";
+    assert!(warnings[0].contains(told), "{warnings:?}");
+    let slower = warnings[0].split('`').nth(1).expect("a command's option");
+    let held = "the run was held to half of the taught speed";
+    assert!(succeeds(at, &format!("{DEVICE} run reach.toml --mode open")).contains(held));
+    let refused = tool::refusal(at, &format!("{DEVICE} --json rehearse reach.toml"));
+    let words = format!("{} {}", refused.message, refused.help);
+    assert!(refused.code == "E640" && words.contains(held) && words.contains("tactus check"), "{words}");
+    // What it advises is done.
+    let (calm, none) = warned(at, slower);
+    assert!(none.is_empty() && calm < 0.46 && calm > 0.4, "{slower}: {calm} m/s, {none:?}");
+    assert!(warned(at, "--speed 0.5").1.is_empty(), "nobody holds back what is as slow already");
+    assert!(!succeeds(at, &format!("{DEVICE} run reach.toml --mode open {slower}")).contains("warn"));
+    succeeds(at, &format!("{DEVICE} rehearse reach.toml {slower}"));
+}

@@ -9,8 +9,9 @@ mod closed_loop;
 mod expected;
 mod plant;
 
-use control::guard::monitor::{HAND_SPEED_LIMIT, TIP_SPEED_LIMIT};
+use control::guard::monitor::{HAND_SPEED_LIMIT, TIP_SPEED_LIMIT, TIP_SPEED_WARNING};
 use control::model::{FINGER_RANGE, SOFT_MAX, SOFT_MIN, SPREAD_RANGE, VELOCITY_MAX};
+use control::plan::bounds::HELD_BACK;
 use control::plan::load::{REACH, within_reach};
 use control::plan::primitive::posture_and_hand;
 use serde::Serialize;
@@ -152,6 +153,8 @@ pub struct CheckReport {
     pub limited_cycles: usize,
     /// The violations; empty if the primitive may move an arm.
     pub violations: Vec<String>,
+    /// Conduct of the device in such a run that nobody has asked for; empty for none.
+    pub warnings: Vec<String>,
 }
 
 impl CheckReport {
@@ -265,11 +268,13 @@ pub fn check(
         tool_speed_max_m_s: 0.0,
         limited_cycles: 0,
         violations: Vec::new(),
+        warnings: Vec::new(),
     };
     check_plan(&primitive, course.speed, &mut report);
     let run = ClosedLoop::play(&primitive, course, progress);
     check_run(file, course, &run, &mut report);
     violations(&mut report);
+    report.warnings.extend(held_back(&report));
     expected::check(file, &primitive, &run, &mut report);
     Ok(report)
 }
@@ -288,6 +293,21 @@ fn violations(report: &mut CheckReport) {
             ));
         }
     }
+}
+
+/// Says where the pendant will warn and the device hold the run back, and at which speed it will not.
+fn held_back(report: &CheckReport) -> Option<String> {
+    let fastest = report.margins.iter().find(|margin| margin.limit == Limit::TipSpeed)?;
+    let asked = report.speed > f64::from(HELD_BACK);
+    (asked && fastest.value > TIP_SPEED_WARNING).then(|| {
+        // Rounded down, and a tenth less: a compliant arm that catches up with its plan is faster than that.
+        let below = (0.9 * report.speed * TIP_SPEED_WARNING / fastest.value * 100.0).floor() / 100.0;
+        format!(
+            "elbow or forearm come to {:.2} m/s at {:.2} s: from {TIP_SPEED_WARNING} m/s on the pendant warns, and while \
+             it does the run is held to half of the taught speed; with `--speed {below}` it does not",
+            fastest.value, fastest.time_s
+        )
+    })
 }
 
 /// Check sum of an image as the device tells it: of everything before the check sum at its end.

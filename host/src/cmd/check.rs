@@ -37,6 +37,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let report = check::check(&file, &course, |fraction| bar.set_position((fraction * 100.0) as u64))
         .map_err(|cause| failure(cause, &command.primitive, "check"))?;
     bar.finish_and_clear();
+    report.warnings.iter().for_each(|warning| output.warn(warning));
     if report.passed() {
         return output.result(&report, report.to_text());
     }

@@ -348,6 +348,10 @@ pub(super) fn memory_failure(cause: MemoryError, doing: &str) -> Failure {
         MemoryError::Saturated { .. } | MemoryError::Stale { .. } => {
             "check the force sensor and its cable, and that the hand touches nothing"
         }
+        MemoryError::HeldBack { .. } => {
+            "the usual cause is an arm that is faster than the pendant likes: `tactus check PRIMITIVE` tells the speed \
+             at which it is not, for `--speed`; `tactus status` shows a warning that goes on, and temperatures"
+        }
         MemoryError::Duration { .. } => "give recordings of this primitive, all at the same speed",
         MemoryError::Others { .. } => {
             return Failure::new(ErrorCode::RecordingOfOthers, doing, cause);

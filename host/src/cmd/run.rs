@@ -350,13 +350,14 @@ fn tell(outcome: &RunOutcome, output: Output) {
         ));
     }
     let seconds = |samples: usize| samples as f64 / RATE;
-    let FlagCounts { faded, saturated, stale, hand_lost, clamped, .. } = outcome.flags;
+    let FlagCounts { faded, saturated, stale, hand_lost, clamped, slowed, .. } = outcome.flags;
     for (samples, words) in [
         (clamped, "the adaptation was at its limits"),
         (faded, "the adaptation was derated or fading"),
         (saturated, "the force sensor was saturated; force control was paused"),
         (stale, "the force sensor was silent"),
         (hand_lost, "the hand did not answer and got no commands"),
+        (slowed, "the run was held to half of the taught speed: the pendant warned, or a motor was hot"),
     ] {
         if samples > 0 {
             output.say(format!("for {:.2} s {words}", seconds(samples)));

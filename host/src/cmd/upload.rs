@@ -141,7 +141,10 @@ pub(super) fn precheck(
         .map_err(|cause| super::check::failure(cause, &file.file, doing))?;
     bar.finish_and_clear();
     match report.violations.first() {
-        None => Ok(report),
+        None => {
+            report.warnings.iter().for_each(|warning| output.warn(warning));
+            Ok(report)
+        }
         Some(first) => {
             Err(Failure::new(ErrorCode::CheckFailed, format!("{doing} refused: the check failed"), first.to_string())
                 .help(course.help(&file.file, &report)))

@@ -16,6 +16,10 @@ use crate::units::{JOINTS, Vector7, Wrench};
 /// Largest speed of elbow and forearm in any state with torque (m/s); the safety module faults at 1.0.
 pub const TIP_SPEED_LIMIT: f64 = 0.8;
 
+/// Speed of elbow and forearm from which the pendant warns, as the safety module has it at power-up (m/s). While it
+/// warns a run is held to [`HELD_BACK`](crate::plan::bounds::HELD_BACK).
+pub const TIP_SPEED_WARNING: f64 = 0.5;
+
 /// Largest speed of the hand in any state with torque (m/s). The safety module does not watch it; wrist and forearm can
 /// make it thrice as fast as the elbow. Above what a change of goal may lead to (0.8 m/s), below the speed at which a
 /// hand of this mass reaches the transient limits for a person (1.4 m/s).

@@ -22,6 +22,9 @@ pub const DISPLACEMENT: [f64; 3] = [1.0, core::f64::consts::PI, 3.0];
 /// start: twice what the arm is allowed, because fast demonstrations are run slowly.
 pub const SPEED: [f64; 4] = [2.0, 8.0, 8.0, 12.0];
 
+/// Largest speed factor of a run while a motor is hot or the pendant warns.
+pub const HELD_BACK: f32 = 0.5;
+
 /// Largest acceleration of the plan, in the same order (m/s^2, rad/s^2).
 pub const ACCELERATION: [f64; 4] = [40.0, 400.0, 400.0, 2000.0];
 

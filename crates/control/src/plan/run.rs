@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 
 use crate::command::{Goal, Refusal, RunOptions};
 use crate::guard::watch::{Surprise, Watch};
+use crate::plan::bounds::HELD_BACK;
 use crate::plan::brake::brake;
 use crate::plan::goal::GoalFilter;
 use crate::plan::hand::Grasp;
@@ -22,9 +23,6 @@ pub(crate) const START_DISTANCE: f64 = 0.05;
 
 /// Allowed speed factors.
 pub(crate) const SPEEDS: (f32, f32) = (0.1, 2.0);
-
-/// Speed factor of a run that is held back.
-const SLOW: f32 = 0.5;
 
 /// The plan counts as at rest below these speeds (m/s, rad/s).
 const REST: (f64, f64) = (2e-3, 1e-2);
@@ -112,7 +110,7 @@ pub(crate) struct Run<R: Real, const N: usize> {
     load: R,
     /// Speed factor that was asked for.
     speed: f32,
-    /// It is held to [`SLOW`].
+    /// It is held to [`HELD_BACK`].
     slow: bool,
 }
 
@@ -265,7 +263,7 @@ impl<R: Real, const N: usize> Run<R, N> {
         if !(factor >= SPEEDS.0 && factor <= SPEEDS.1) {
             return Err(Refusal::OutOfRange);
         }
-        let held = if self.slow && factor > SLOW { SLOW } else { factor };
+        let held = if self.slow && factor > HELD_BACK { HELD_BACK } else { factor };
         set_speed(&mut self.rollout, primitive, held)?;
         self.speed = factor;
         Ok(())

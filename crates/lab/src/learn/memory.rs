@@ -107,6 +107,17 @@ pub enum MemoryError {
         /// Samples.
         samples: usize,
     },
+    /// The device held the run back for so long that it is not of the speed that was asked for.
+    #[error(
+        "{file}: the run was held to half of the taught speed in {samples} samples, because the pendant warned or a \
+         motor was hot", file = file.display()
+    )]
+    HeldBack {
+        /// The recording.
+        file: PathBuf,
+        /// Samples.
+        samples: usize,
+    },
     /// The recordings were not made at one speed, or not of this movement.
     #[error("{file}: the movement took {found:.2} s, {expected:.2} s were expected", file = file.display())]
     Duration {
@@ -299,12 +310,16 @@ fn runs<const CHANNELS: usize>(
                 return Err(MemoryError::Several { file: recording.file.clone(), line });
             }
             let run = recording.running();
+            let count = |mask: u32| run.flags.iter().flatten().filter(|flags| **flags & mask != 0).count();
             let (samples, found) = progress(&run, primitive.movement.alpha)?;
             if (found - duration).abs() > SAME_DURATION * duration || !found.is_finite() {
+                let held_back = count(flags::SLOWED);
+                if held_back > 0 {
+                    return Err(MemoryError::HeldBack { file: recording.file.clone(), samples: held_back });
+                }
                 return Err(MemoryError::Duration { file: recording.file.clone(), found, expected: duration });
             }
             if let Some(marks) = &run.flags {
-                let count = |mask: u32| marks.iter().filter(|flags| **flags & mask != 0).count();
                 let (saturated, stale) = (count(flags::SENSOR_SATURATED), count(flags::WRENCH_STALE));
                 if saturated > 0 {
                     return Err(MemoryError::Saturated { file: recording.file.clone(), samples: saturated });

@@ -150,6 +150,8 @@ pub struct FlagCounts {
     pub stale: usize,
     /// The hand's replies were missing for so long that it was left alone.
     pub hand_lost: usize,
+    /// The run was held to half of the taught speed.
+    pub slowed: usize,
 }
 
 impl FlagCounts {
@@ -162,6 +164,7 @@ impl FlagCounts {
         count(&mut self.saturated, flags::SENSOR_SATURATED);
         count(&mut self.stale, flags::WRENCH_STALE);
         count(&mut self.hand_lost, flags::HAND_LOST);
+        count(&mut self.slowed, flags::SLOWED);
     }
 }
 
