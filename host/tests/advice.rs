@@ -54,6 +54,63 @@ fn a_folder_does_not_hide_a_primitive_in_the_device() {
     succeeds(at, &format!("{DEVICE} run reach --dry-run"));
 }
 
+/// Writes a demonstration through these postures (rad), each after so many seconds, at rest at both ends.
+fn lead(file: &Path, start: [f64; 7], legs: &[(f64, [f64; 7])]) {
+    let mut postures = vec![start; 150];
+    let mut from = start;
+    for (seconds, to) in legs {
+        let steps = (seconds * 300.0) as usize;
+        for step in 0..steps {
+            let u = step as f64 / steps as f64;
+            let share = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+            postures.push(std::array::from_fn(|joint| from[joint] + (to[joint] - from[joint]) * share));
+        }
+        from = *to;
+    }
+    postures.extend([from; 150]);
+    let mut text = "t_s,q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,q7_rad\n".to_owned();
+    for (sample, posture) in postures.iter().enumerate() {
+        let angles: Vec<String> = posture.iter().map(|angle| format!("{angle:.7}")).collect();
+        text += &format!("{:.6},{}\n", sample as f64 / 300.0, angles.join(","));
+    }
+    std::fs::write(file, text).unwrap();
+}
+
+/// The plan of a long movement whose last part is fast is off its goal behind its end, where its last kernel acts alone:
+/// 90 mrad after five seconds. The refusal spoke of a demonstration that does not end at rest.
+///
+/// The changes that make it fail: nobody looks behind the end of the plan; the refusal does not name the kernels.
+#[test]
+fn a_long_movement_with_a_fast_end_is_told_to_have_more_kernels_and_passes_with_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (start, over) = ([0.1, 1.2, 0.1, 1.5, 0.1, 0.2, 0.3], [0.5, 1.2, 0.2, 1.7, 0.1, 0.1, 0.3]);
+    lead(&at.join("quick.csv"), start, &[(9.0, over), (0.8, [0.5, 1.1, 0.2, 1.5, 0.9, 0.9, 1.3])]);
+    let told = said(&succeeds(at, "learn quick.csv"));
+    assert!(
+        told.contains("a second behind its end the plan is off its goal") && told.contains("--kernels 100"),
+        "{told}"
+    );
+    let (code, help) = refused(at, "check quick.toml");
+    assert!(code == "E631" && help.contains("`--kernels 100`"), "{help}");
+    assert!(!said(&succeeds(at, "learn quick.csv --kernels 100 --force")).contains("kernels are too few"));
+    succeeds(at, "check quick.toml");
+}
+
+/// Where the plan comes to its goal and the arm does not, more rest in the demonstration mends nothing.
+///
+/// The change that makes it fail: the refusal does not look at where the plan is.
+#[test]
+fn an_arm_that_is_stretched_out_at_its_goal_is_told_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (start, out) = ([0.4, 1.2, -0.2, 0.6, 0.1, 0.9, 0.9], [0.05, 1.15, -0.5, -0.05, 0.2, 0.83, 0.53]);
+    lead(&at.join("out.csv"), start, &[(1.6, out)]);
+    succeeds(at, "learn out.csv");
+    let (code, help) = refused(at, "check out.toml");
+    assert!(code == "E631" && help.contains("stretched out") && !help.contains("still-speed"), "{help}");
+}
+
 #[test]
 fn one_run_does_not_count_as_several() {
     let folder = learned(3.0);

@@ -3,7 +3,7 @@
 use control::plan::primitive::{Coupling, Reference, Rollout, StartState};
 use dmp::RolloutError;
 
-use crate::demonstration::RATE;
+use crate::demonstration::{RATE, angle_between};
 use crate::plot::movement::PosePath;
 use crate::primitive_file::HostPrimitive;
 
@@ -19,6 +19,23 @@ pub fn roll_out(primitive: &HostPrimitive) -> Result<Vec<Reference<f64>>, Rollou
     let mut rollout = Rollout::start(movement, &StartState::demonstrated(movement))?;
     let cycles = cycles(movement.duration());
     (0..cycles).map(|_| rollout.step(movement, PERIOD, &Coupling::NONE)).collect()
+}
+
+/// Distance of the plan from its goal (m) and angle (rad), `seconds` behind the end of the movement.
+///
+/// # Errors
+/// The stored start is no valid start ([`RolloutError`]).
+pub fn left_behind(primitive: &HostPrimitive, seconds: f64) -> Result<(f64, f64), RolloutError> {
+    let movement = primitive.movement();
+    let mut rollout = Rollout::start(movement, &StartState::demonstrated(movement))?;
+    let mut last = rollout.step(movement, PERIOD, &Coupling::NONE)?;
+    for _ in 1..cycles(movement.duration() + seconds) {
+        last = rollout.step(movement, PERIOD, &Coupling::NONE)?;
+    }
+    let goal = &movement.goal().poses[0];
+    let away = (0..3).map(|axis| (last.poses[0].position.x[axis] - goal.position[axis]).powi(2)).sum::<f64>().sqrt();
+    let q = &goal.orientation;
+    Ok((away, angle_between(&orientation(&last), &[q.w, q.x, q.y, q.z])))
 }
 
 /// Cycles of a movement of `duration` s, both ends included.

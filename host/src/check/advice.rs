@@ -32,7 +32,8 @@ impl CheckReport {
         }
         // The fingers were not shown: options of `learn` gave their angles.
         let of_hand = broken().next().is_some() && broken().all(|margin| margin.limit == Limit::HandPosition);
-        // Such a plan comes to its goal in motion, or short of it: its end was cut off, or was never at rest.
+        // A plan that does not arrive comes to its goal in motion, or short of it: its end was cut off, or was never at
+        // rest, or its last part is too fast for its kernels. Where the plan arrives, it is the arm that does not.
         let of_goal = broken().next().is_some()
             && broken().all(|margin| matches!(margin.limit, Limit::GoalPosition | Limit::GoalOrientation));
         let of_expectation = broken().next().is_some()
@@ -45,8 +46,10 @@ impl CheckReport {
             "record what it expects again (`tactus rehearse`)"
         } else if of_hand {
             "learn it again with other angles of the hand (`--hand-start`, `--hand-goal`)"
+        } else if of_goal && self.goal_m.is_none() && self.plan_arrives {
+            "show the movement with its end farther from where the arm is stretched out, and from the limits of its joints: near them it comes to its goal too slowly"
         } else if of_goal && self.goal_m.is_none() {
-            "learn it again so that it ends at rest: with a lower `--still-speed 0.001`, with `--no-trim`, or from a demonstration that rests at its goal"
+            "learn it again so that it ends at rest: with more kernels (`--kernels 100`), with a lower `--still-speed 0.001`, with `--no-trim`, or from a demonstration that rests at its goal"
         } else {
             "show the movement farther from the limits and learn it again"
         };

@@ -155,6 +155,9 @@ pub struct CheckReport {
     pub violations: Vec<String>,
     /// Conduct of the device in such a run that nobody has asked for; empty for none.
     pub warnings: Vec<String>,
+    /// True if the plan itself comes to its goal; false as well of one that nobody has followed so far.
+    #[serde(skip)]
+    plan_arrives: bool,
 }
 
 impl CheckReport {
@@ -269,6 +272,7 @@ pub fn check(
         limited_cycles: 0,
         violations: Vec::new(),
         warnings: Vec::new(),
+        plan_arrives: false,
     };
     check_plan(&primitive, course.speed, &mut report);
     let run = ClosedLoop::play(&primitive, course, progress);
@@ -436,6 +440,9 @@ fn check_run(file: &PrimitiveFile, course: &Course, run: &ClosedLoop, report: &m
         let orientation = goal.orientation.map_or(file.goal.orientation, |parts| parts.map(f64::from));
         let away = (0..3).map(|axis| (last.position[axis] - place[axis]).powi(2)).sum::<f64>().sqrt();
         let turned = angle_between(&last.orientation, &orientation);
+        let [x, y, z, planned @ ..] = last.record.pose_d.map(f64::from);
+        let off = (0..3).map(|axis| ([x, y, z][axis] - place[axis]).powi(2)).sum::<f64>().sqrt();
+        report.plan_arrives = off < GOAL_DISTANCE / 2.0 && angle_between(&planned, &orientation) < GOAL_ANGLE / 2.0;
         for (limit, value, bound) in
             [(Limit::GoalPosition, away, GOAL_DISTANCE), (Limit::GoalOrientation, turned, GOAL_ANGLE)]
         {

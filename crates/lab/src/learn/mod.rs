@@ -169,6 +169,9 @@ const COARSE_POSITION: f64 = 2e-3;
 /// Reproductions worse than this (rad, RMS: half a degree) deserve more kernels.
 const COARSE_ORIENTATION: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
+/// Time behind the end of the movement at which its plan should have come to its goal, s.
+const BEHIND: f64 = 1.0;
+
 /// Reproductions that leave the way by more than this somewhere (m, rad) are no reproductions: 3 cm, 10 degrees.
 const WORST_REPRODUCTION: (f64, f64) = (0.03, 10.0 * std::f64::consts::PI / 180.0);
 
@@ -230,15 +233,7 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
     if position > WORST_REPRODUCTION.0 || orientation > WORST_REPRODUCTION.1 {
         return Err(LearnError::Poor { file: recording.file.clone(), position, orientation });
     }
-    let coarse = report.position_rms_m > COARSE_POSITION || report.orientation_rms_rad > COARSE_ORIENTATION;
-    if coarse && options.kernels < KERNEL_CAPACITY {
-        report.warnings.push(format!(
-            "{} kernels are too few for this movement: the reproduction is off by {:.1} mm and {:.1} degrees RMS; learn it with --kernels {KERNEL_CAPACITY}",
-            options.kernels,
-            report.position_rms_m * 1e3,
-            report.orientation_rms_rad.to_degrees()
-        ));
-    }
+    report.warnings.extend(few_kernels(&report, &primitive, options));
     primitive.provenance = Some(Provenance {
         demonstration: recording.file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
         demonstration_checksum: recording.checksum,
@@ -251,6 +246,28 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
         tool: format!("tactus {}", env!("CARGO_PKG_VERSION")),
     });
     Ok(Learned { primitive, report, demonstration })
+}
+
+/// Warning of too few kernels: the plan leaves the way that was shown, or, where the last part of a long movement is
+/// fast, its goal behind the end. There its last kernel acts alone, and fades within a fifth of the duration.
+fn few_kernels(report: &FitReport, primitive: &PrimitiveFile, options: &LearnOptions) -> Option<String> {
+    if options.kernels >= KERNEL_CAPACITY {
+        return None;
+    }
+    let words = |off: &str, metres: f64, radians: f64| {
+        let (mm, degrees) = (metres * 1e3, radians.to_degrees());
+        format!(
+            "{} kernels are too few for this movement: {off} by {mm:.1} mm and {degrees:.1} degrees; learn it with \
+             --kernels {KERNEL_CAPACITY}",
+            options.kernels
+        )
+    };
+    if report.position_rms_m > COARSE_POSITION || report.orientation_rms_rad > COARSE_ORIENTATION {
+        return Some(words("the RMS of the reproduction is off", report.position_rms_m, report.orientation_rms_rad));
+    }
+    let (away, turned) = plan::left_behind(&primitive.to_primitive().ok()?, BEHIND).ok()?;
+    (away > COARSE_POSITION || turned > COARSE_ORIENTATION)
+        .then(|| words("a second behind its end the plan is off its goal", away, turned))
 }
 
 /// Warnings of a slow approach or departure that counted as rest: the primitive would end short of where it was led.
