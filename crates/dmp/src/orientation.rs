@@ -31,7 +31,8 @@ pub enum Hemisphere {
     /// Start and goal carry the signs of a sign-continuous demonstration: a run aligns its own to them.
     #[default]
     Demonstrated,
-    /// There is no demonstration: the goal is taken on the side nearest to the current orientation.
+    /// There is no demonstration: the goal is taken on the side nearest to the current orientation. Rotation vectors
+    /// keep to the side that is nearest to the start stored in the primitive, wherever a run starts.
     Nearest,
 }
 

@@ -77,7 +77,9 @@ pub enum PrimitiveError {
     Alpha,
     /// Fewer than two kernels, or more than the capacity.
     KernelCount,
-    /// The activation at the next centre is outside 0.05..0.95.
+    /// The activation at the next centre is outside 0.05..0.95, or the number type cannot hold so many or so few
+    /// kernels of this activation and decay: fixed point ends at 970 of the default ones, and does not hold two where
+    /// `alpha` is large.
     Activation,
     /// Not exactly `kernel_count` weights for each row.
     WeightCount,
@@ -143,7 +145,9 @@ impl fmt::Display for PrimitiveError {
             Self::Duration => f.write_str("the duration is not a positive number up to 3600 s"),
             Self::Alpha => f.write_str("alpha lets the phase end outside 1e-6..0.1"),
             Self::KernelCount => f.write_str("fewer than two kernels or more than fit"),
-            Self::Activation => f.write_str("the kernel activation is outside 0.05..0.95"),
+            Self::Activation => f.write_str(
+                "the kernel activation is outside 0.05..0.95, or the number type cannot hold so many or so few kernels",
+            ),
             Self::WeightCount => f.write_str("the number of weights is not rows times kernels"),
             Self::Weight => f.write_str("a weight is not a number, or more than the number type keeps"),
             Self::ControlPeriod => f.write_str("the control period is not between 1e-6 and 3600 s"),

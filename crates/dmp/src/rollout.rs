@@ -67,7 +67,8 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
     /// Starts a run: `x0 <- start`, goal as stored, `s <- 1`, at the taught speed.
     ///
     /// The start orientation takes the sign of the demonstration's start. Without a demonstration the goal takes the
-    /// sign that is nearest to the start.
+    /// sign that is nearest to the start, with [`OrientationError::RotationVector`](crate::OrientationError) that
+    /// nearest to the start of the primitive.
     ///
     /// # Errors
     /// [`RolloutError::NotFinite`], [`RolloutError::TooLarge`], [`RolloutError::NotUnit`],
@@ -206,7 +207,8 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
     }
 
     /// New goal of the orientation of a pose, either sign: it is aligned with the demonstrated goal, or without a
-    /// demonstration with the present orientation.
+    /// demonstration with the present orientation. Rotation vectors always take the one nearest to the primitive's
+    /// goal: 100 degrees to the other side of the start than a goal of 170 are reached by a turn of 260.
     ///
     /// # Errors
     /// [`RolloutError::NoSuchPose`], [`RolloutError::NotFinite`], [`RolloutError::NotUnit`],

@@ -235,6 +235,62 @@ fn start_turned_past_a_full_turn_still_goes_the_demonstrated_way() {
     }
 }
 
+/// Guards what is documented of rotation vectors without a demonstration: the stored start and goal tell the way round.
+#[test]
+fn rotation_vectors_without_a_demonstration_go_the_way_of_the_stored_start_and_goal() {
+    let about_z = |degrees: f64| Quaternion::from_rotation_vector(&[0.0, 0.0, degrees.to_radians()]);
+    let at = |degrees: f64| StartState::at_rest(configuration([0.0; 3], about_z(degrees), [0.0; 7], [0.0; 4]));
+    let mut plan = Plan::empty();
+    plan.goal.poses[0].orientation = about_z(170.0);
+    let cases = [(-20.0, None, 190.0, -170.0), (0.0, Some(190.0), 190.0, -170.0), (0.0, Some(-100.0), 260.0, -100.0)];
+    for (from, goal, by_vectors, by_quaternions) in cases {
+        let errors = [OrientationError::RotationVector, OrientationError::Quaternion];
+        for (error, expected) in errors.into_iter().zip([by_vectors, by_quaternions]) {
+            plan.orientation_error = error;
+            let primitive = plan.build::<f64>();
+            let mut rollout = Rollout::start(&primitive, &at(from)).unwrap();
+            if let Some(goal) = goal {
+                rollout.set_goal_orientation(&primitive, 0, about_z(goal)).unwrap();
+            }
+            let (mut turned, mut last) = (0.0, about_z(from));
+            for _ in 0..9000 {
+                let q = rollout.step(&primitive, DT, &Coupling::NONE).unwrap().poses[0].orientation.quaternion;
+                turned += last.conjugate().product(&q.aligned_with(&last)).rotation_vector()[2].to_degrees();
+                last = q;
+            }
+            assert!((turned - expected).abs() < 0.5, "{error:?} from {from} to {goal:?}: {turned}");
+        }
+    }
+}
+
+/// Guards the words about kernels that fixed point cannot hold, though their activation is within its bounds.
+#[test]
+fn kernels_that_fixed_point_cannot_hold_are_not_blamed_on_their_activation_alone() {
+    let f = FixedPoint::from_f64;
+    for (count, alpha, activation) in [(1000, ALPHA, 0.7), (2, 8.8, 0.45)] {
+        let (plain, weights) = (tables(&[]), vec![0; ROWS * count]);
+        let fixed = Tables::<FixedPoint> {
+            control_period: f(DT),
+            duration: f(5.0),
+            alpha: f(alpha),
+            activation: f(activation),
+            kernel_count: count,
+            weights: &weights,
+            gains: plain.gains.cast(),
+            orientation_error: plain.orientation_error,
+            hemisphere: plain.hemisphere,
+            start: plain.start.cast(),
+            goal: plain.goal.cast(),
+            start_velocity: plain.start_velocity.cast(),
+        };
+        let words = Primitive::<FixedPoint, 1000>::new(&fixed).unwrap_err().to_string();
+        assert!(words.contains("the number type cannot hold so many or so few kernels"), "{count}: {words}");
+        let weights = vec![0.0; ROWS * count];
+        let double = Tables { kernel_count: count, alpha, activation, weights: &weights, ..tables(&[]) };
+        assert!(Primitive::<f64, 1000>::new(&double).is_ok(), "f64 holds {count} kernels");
+    }
+}
+
 #[test]
 fn tables_interpolate_and_hold_outside() {
     let table = PhaseTable::<f64, 1, 4>::new(&[[1.0], [3.0], [2.0]]).unwrap();
