@@ -22,7 +22,7 @@ const LARGEST_SQUARE: f64 = 1e100;
 ///
 /// # Errors
 /// [`TableError::Empty`] without a usable sample, [`TableError::TooMany`], [`TableError::NotFinite`],
-/// [`TableError::Duration`].
+/// [`TableError::Duration`], [`TableError::TooLarge`] for a value that no sensor has.
 pub fn expected_sensors<const SENSORS: usize, const CAPACITY: usize>(
     samples: &[(f64, [f64; SENSORS])],
     count: usize,

@@ -97,7 +97,8 @@ pub fn phase_statistics<const CHANNELS: usize>(
 ///
 /// # Errors
 /// [`TableError::Trials`] without a run, [`TableError::TooMany`] above the capacity, [`TableError::Spread`] for a floor
-/// that is not positive, [`TableError::Empty`], [`TableError::NotFinite`].
+/// that is not positive or a spread that stays below 1e-6, [`TableError::TooLarge`] for a value that no sensor has,
+/// [`TableError::Empty`], [`TableError::NotFinite`].
 pub fn sensor_statistics<const CHANNELS: usize, const CAPACITY: usize>(
     trials: &[&[(f64, [f64; CHANNELS])]],
     count: usize,

@@ -6,8 +6,8 @@ use crate::arm::{
 };
 use crate::common::{ALPHA, DT, Plan, run};
 use dmp::{
-    FixedPoint, GainError, Group, Hemisphere, OrientationError, PhaseTable, PrimitiveError, Quaternion, RolloutError,
-    Scalar, TableError,
+    Entry, FixedPoint, GainError, Group, Hemisphere, OrientationError, PhaseTable, PrimitiveError, Quaternion,
+    RolloutError, Scalar, TableError,
 };
 use proptest::prelude::*;
 
@@ -208,6 +208,38 @@ fn goal_filter_turns_the_jump_into_a_ramp() {
     assert!(jump(Some(12.5)) < 0.05);
 }
 
+/// Guards what is documented of a filter in f32: it reaches its goal while it goes 1e-5 of its way in a tick.
+#[test]
+fn a_goal_filter_reaches_its_goal_down_to_the_documented_share_of_a_tick() {
+    let system = dmp::Gain { stiffness: 1e4_f32, damping: 200.0 };
+    let end = dmp::Configuration::<f32, 1, 0> { poses: [], points: [10.0] };
+    for (duration, reached) in [(190.0, true), (250.0, false)] {
+        let tables = dmp::PrimitiveTables {
+            control_period: 1e-3,
+            duration,
+            alpha: 4.6,
+            activation: 0.7,
+            kernel_count: 2,
+            weights: &[0.0; 2],
+            gains: dmp::Gains { poses: [], points: [system] },
+            orientation_error: OrientationError::Quaternion,
+            hemisphere: Hemisphere::Nearest,
+            start: end,
+            goal: end,
+            start_velocity: dmp::Velocity::ZERO,
+        };
+        let primitive = dmp::Primitive::<f32, 1, 0, 2>::new(&tables).unwrap();
+        let mut rollout = dmp::Rollout::start(&primitive, &dmp::StartState::at_rest(end)).unwrap();
+        rollout.set_goal_filter(Some(2.0)).unwrap();
+        rollout.set_goal_points([10.04]).unwrap();
+        let mut value = 0.0;
+        while rollout.progress() < 2.0 {
+            value = rollout.step(&primitive, 1e-3, &dmp::Coupling::NONE).unwrap().points.x[0];
+        }
+        assert_eq!((value - 10.04).abs() < 1e-4, reached, "in {duration} s: {value}");
+    }
+}
+
 #[test]
 fn start_turned_past_a_full_turn_still_goes_the_demonstrated_way() {
     // Demonstrated: 350 degrees about z. Started 20 degrees further back, in either sign.
@@ -301,6 +333,21 @@ fn tables_interpolate_and_hold_outside() {
     assert_eq!(PhaseTable::<f64, 1, 4>::new(&[]), Err(TableError::Empty));
     assert_eq!(PhaseTable::<f64, 1, 4>::new(&[[0.0]; 5]), Err(TableError::TooMany));
     assert_eq!(PhaseTable::<f64, 1, 4>::new(&[[f64::NAN]]), Err(TableError::NotFinite));
+}
+
+/// Guards what is documented of recorded values that are refused: too large ones, and a spread that stays too small.
+#[test]
+fn recorded_values_that_no_sensor_has_and_a_spread_of_almost_nothing_are_refused() {
+    let run = |value: f64| [(0.0, [value]), (1.0, [value])];
+    let expected = dmp::fit::expected_sensors::<1, 2>(&run(2e5), 2, 1.0).unwrap_err();
+    assert_eq!(expected, TableError::TooLarge(Entry::Expected { point: 0, column: 0 }));
+    let statistics = |value: f64, floor: f64| {
+        let trials = [run(value), run(value)];
+        dmp::fit::sensor_statistics::<1, 2>(&trials.each_ref().map(|run| run.as_slice()), 2, &[floor], &[false])
+    };
+    assert_eq!(statistics(2e5, 1.0).unwrap_err(), TableError::TooLarge(Entry::Mean { point: 0, column: 0 }));
+    assert_eq!(statistics(1.0, 1e-9).unwrap_err(), TableError::Spread);
+    assert!(statistics(1.0, 1e-3).is_ok());
 }
 
 #[test]
