@@ -248,8 +248,8 @@ impl<T: Scalar, const D: usize, const P: usize, const N: usize> Rollout<T, D, P,
         self.points.settle();
     }
 
-    /// Goal filter `tau gd = a_g (g_commanded - g)` for the goals set from now on; 12.5 is a usual `a_g`. In f32 a filter
-    /// with `a_g dt/tau` below 1e-5 stops on its way, where its steps are less than the last digit of the goal.
+    /// Goal filter `tau gd = a_g (g_commanded - g)` for the goals set from now on; 12.5 is a usual `a_g`. In f32 a
+    /// filter with `a_g dt/tau` below 1e-5 stops on its way, where its steps are less than the last digit of the goal.
     ///
     /// `None` (the default, as in the paper) lets goals act at once, including one the filter has not reached yet.
     ///
