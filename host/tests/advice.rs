@@ -76,8 +76,8 @@ fn lead(file: &Path, start: [f64; 7], legs: &[(f64, [f64; 7])]) {
     std::fs::write(file, text).unwrap();
 }
 
-/// The plan of a long movement whose last part is fast is off its goal behind its end, where its last kernel acts alone:
-/// 90 mrad after five seconds. The refusal spoke of a demonstration that does not end at rest.
+/// The plan of a long movement whose last part is fast is off its goal behind its end, where its last kernel acts
+/// alone: 90 mrad after five seconds. The refusal spoke of a demonstration that does not end at rest.
 ///
 /// The changes that make it fail: nobody looks behind the end of the plan; the refusal does not name the kernels.
 #[test]
