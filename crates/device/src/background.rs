@@ -11,6 +11,7 @@
 //! | TEMP | 1 Hz for each puck | heat |
 //! | STAT of sensor or hand, if the start-up missed it | 10 Hz, in turn | the arm carries it all the same |
 //! | STAT of one puck of a hand, missed or lost | 10 Hz, while the arm is IDLE | the hand comes back with it |
+//! | STAT of each puck of a hand that is not initialised | 1 Hz and more | one that has restarted has to be woken |
 //!
 //! The odd slots may be taken by the hand for something more urgent. A property that is new here has to be named in
 //! [`BackgroundPoll::take`], which takes every other answer for the pendant word.
@@ -55,7 +56,7 @@ pub(crate) enum PollReply {
     /// TEMP of a puck (0..=6), degree Celsius.
     Temperature(usize, i32),
     /// STAT of the sensor or of a hand puck, whether it was found at the start-up or not.
-    Present(Node),
+    Present(Node, i32),
     /// STAT of a suspected puck.
     Status(Node, i32),
     /// MODE of a hand puck.
@@ -153,7 +154,7 @@ impl BackgroundPoll {
         }
         self.asked = None;
         Some(match property {
-            PropertyId::STAT if node.arm_index().is_none() => PollReply::Present(node),
+            PropertyId::STAT if node.arm_index().is_none() => PollReply::Present(node, value),
             PropertyId::STAT => PollReply::Status(node, value),
             TEMPERATURE if node.hand_index().is_some() => PollReply::HandTemperature(node.hand_index()?, value),
             TEMPERATURE if node != Node::SAFETY_MODULE => PollReply::Temperature(node.arm_index()?, value),

@@ -203,7 +203,11 @@ impl DeviceController {
                     *place = Some(value as i16);
                 }
             }
-            PollReply::Present(node) => self.late = Some(node),
+            PollReply::Present(node, value) => {
+                if !self.hand.hear_status(node, value) {
+                    self.late = Some(node);
+                }
+            }
             PollReply::Status(_, value) => {
                 if Status::from_value(value) != Some(Status::Ready) {
                     self.fail();
@@ -411,7 +415,7 @@ impl DeviceController {
         }
         let rests = self.safety_mode == Some(SafetyMode::Idle) && !self.cycle.state().has_torque();
         let (sensor, digit) = self.startup.absent(rests);
-        let absent = (sensor, digit.or(self.hand.lost_puck().filter(|_| rests)));
+        let absent = (sensor, digit.or_else(|| self.hand.puck_in_doubt(self.number, rests)));
         let question = match (poll.begin(), self.round.suspect()) {
             (Some(safety), _) => Some(safety),
             (None, Some(node)) => Some(poll.suspect(node)),

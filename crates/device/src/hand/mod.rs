@@ -34,6 +34,10 @@ pub use round::HandRound;
 /// Time that a puck may be silent before the hand is given up: 0.2 s, in rounds, one a control period.
 const SILENT_ROUNDS: u16 = control::time::periods(0.2);
 
+/// Control periods for which one puck of a hand that is not initialised is the one to be asked for its STAT: two of
+/// the slow questions about what is missing, of which one may be the sensor's.
+const TURN_CYCLES: u64 = 60;
+
 /// The hand.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hand {
@@ -125,12 +129,34 @@ impl Hand {
         }
     }
 
-    /// The puck that has restarted or fallen silent: it may sleep, and a start-up alone wakes it.
-    pub(crate) fn lost_puck(&self) -> Option<Node> {
+    /// The puck to be asked for its STAT. One that has restarted or fallen silent may sleep, and a start-up alone wakes
+    /// it: it is asked while the arm `rests`. Before the initialisation nothing else tells of one that has restarted;
+    /// they take turns by the `cycle`.
+    pub(crate) fn puck_in_doubt(&self, cycle: u64, rests: bool) -> Option<Node> {
         match (self.stage, self.cause) {
-            (HandStage::Failed, Some((node, HandFailure::Reset | HandFailure::Silent))) => Some(node),
+            (HandStage::NotInitialised, _) => {
+                let [f1, f2, f3, spread] = Node::HAND;
+                Some(match cycle / TURN_CYCLES % 4 {
+                    0 => f1,
+                    1 => f2,
+                    2 => f3,
+                    _ => spread,
+                })
+            }
+            (HandStage::Failed, Some((node, HandFailure::Reset | HandFailure::Silent))) => Some(node).filter(|_| rests),
             _ => None,
         }
+    }
+
+    /// The sensor or a puck of the hand has told its STAT; false if it is one that was missed, or lost.
+    pub(crate) fn hear_status(&mut self, node: Node, value: i32) -> bool {
+        if node.hand_index().is_none() || matches!(self.stage, HandStage::Absent | HandStage::Failed) {
+            return false;
+        }
+        if self.stage == HandStage::NotInitialised && Status::from_value(value) != Some(Status::Ready) {
+            self.fail(node, HandFailure::Reset);
+        }
+        true
     }
 
     /// True if its pucks may be asked for MODE and TEMP.

@@ -17,6 +17,8 @@ const COUNTS_PER_REVOLUTION: i32 = puck::hand::COUNTS_PER_REVOLUTION as i32;
 /// The group through which the hand is asked, and those of the arm.
 const HAND_GROUP: i32 = 5;
 const ARM_GROUPS: core::ops::RangeInclusive<i32> = 1..=4;
+/// Start-ups in a row that are begun anew for a puck that answers and then does not. One that never wakes is left.
+const TRIES: u8 = 3;
 
 /// State of the hand as the start-up knows it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,13 +28,32 @@ pub(super) struct HandSurvey {
     digits: [[i32; DIGIT_PROPERTIES.len()]; 4],
     /// A puck of it has not been awake at some time since the cyclic loop: it may have lost its position.
     pub(super) slept: bool,
+    /// Start-ups in a row, before this one, in which a puck of it answered and then did not.
+    pub(super) tried: u8,
     found: Option<Found>,
 }
 
 impl HandSurvey {
-    /// Nothing known but whether a puck has slept.
+    /// Nothing known but whether a puck has slept, and how often it was tried.
     pub(super) fn again(self) -> HandSurvey {
-        HandSurvey { slept: self.slept, ..HandSurvey::default() }
+        HandSurvey { slept: self.slept, tried: self.tried, ..HandSurvey::default() }
+    }
+
+    /// Nothing known after the cyclic loop.
+    pub(super) fn after_loop(self) -> HandSurvey {
+        let tried = if self.speechless().is_some() { self.tried.saturating_add(1) } else { 0 };
+        HandSurvey { tried, ..HandSurvey::default() }
+    }
+
+    /// The puck that was there and did not answer a question, or did not wake: the next time it may.
+    fn speechless(&self) -> Option<Node> {
+        let (node, failure) = self.failure?;
+        matches!(failure, HandFailure::NoAnswer | HandFailure::DidNotWake).then_some(node)
+    }
+
+    /// The same, if it is worth another start-up.
+    pub(super) fn worth_another(&self) -> Option<Node> {
+        self.speechless().filter(|_| self.tried < TRIES)
     }
 }
 

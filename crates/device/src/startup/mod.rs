@@ -234,6 +234,7 @@ impl Startup {
             zeroed_at: self.zeroed_at,
             // Given in this very slot, it is told behind it.
             zero_request: self.zero_request,
+            hand: self.hand.after_loop(),
             stopping: Some(Stopping::default()),
             continuity: Some(Continuity::since(now_us, last)),
             ..Startup::new()
@@ -349,11 +350,12 @@ impl Startup {
         self.survey.is_present(Node::FORCE_TORQUE)
     }
 
-    /// Whom to ask because the start-up did not find them: the sensor, and a puck of the hand. One puck of four tells
-    /// nothing of what the arm carries, so the start-up is not begun anew for it unless the arm `rests`, IDLE.
+    /// Whom to ask because the start-up did not find them, or lost their answers: the sensor, and a puck of the hand.
+    /// One puck of four tells nothing of what the arm carries, so the start-up is not begun anew for it unless the arm
+    /// `rests`, IDLE.
     pub(crate) fn absent(&self, rests: bool) -> (bool, Option<Node>) {
-        let digit = self.survey.missing_digit().filter(|_| rests || !self.survey.has_digits());
-        (!self.has_sensor(), digit)
+        let digit = self.survey.missing_digit().or_else(|| self.hand.worth_another());
+        (!self.has_sensor(), digit.filter(|_| rests || !self.survey.has_digits()))
     }
 
     /// The reason for which the start-up begins anew.

@@ -143,6 +143,7 @@ impl Startup {
         }
         // What went wrong before no longer matters: a person is at work.
         self.error = None;
+        self.hand.tried = 0;
         Ok(Next::Go(Step::AwaitIdle { next_us: outlet.now_us() + POLL_US }))
     }
 

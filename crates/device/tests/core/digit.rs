@@ -48,6 +48,8 @@ pub(crate) struct Digit {
     pub(crate) celsius: i32,
     /// Answers to position and gauge requests that are lost from now on.
     pub(crate) lose: u32,
+    /// Answers about GRPA, which a start-up asks once it is awake, that are lost from now on.
+    pub(crate) lose_groups: u32,
 }
 
 impl Digit {
@@ -78,6 +80,7 @@ impl Digit {
             lose_brakes: 0,
             celsius: 41 + index as i32,
             lose: 0,
+            lose_groups: 0,
         }
     }
 
@@ -167,6 +170,10 @@ impl Digit {
         let [group_a, group_b, group_c] = self.groups;
         Some(match property {
             Property::Sg if self.is_lost() => return None,
+            Property::Grpa if self.lose_groups > 0 => {
+                self.lose_groups -= 1;
+                return None;
+            }
             Property::Stat => if awake { Status::Ready } else { Status::Reset }.value(),
             Property::Role => self.role,
             Property::Vers => {

@@ -6,7 +6,7 @@ use link::HandStage;
 use puck::Node;
 
 use crate::digit::Digit;
-use crate::double::{Bus, HOME, holding_with_ready_hand, silent_device};
+use crate::double::{Bus, HOME, holding_with_hand, holding_with_ready_hand, silent_device};
 
 /// An arm at rest, IDLE, whose hand is ready.
 fn resting_with_ready_hand() -> (Box<DeviceController>, Bus) {
@@ -149,6 +149,82 @@ fn g2_a_hand_that_lost_a_puck_in_the_loop_is_woken_and_initialised_once_the_arm_
         bus.run_until(&mut core, Stage::WaitingForActive);
         assert_eq!((core.health().hand, core.health().zeroed), (HandStage::NotInitialised, true), "{:?}", bus.events);
         holds_with_a_ready_hand_again(&mut core, &mut bus);
+    }
+}
+
+/// A start-up of which a puck of the hand lost the answers, or that it slept through, is begun anew once the arm is
+/// idle. The change that makes it fail: only pucks that did not answer at all are looked for.
+#[test]
+fn g4_a_hand_whose_answers_were_lost_in_the_start_up_comes_back_once_the_arm_is_idle() {
+    for (digit, sleeps) in [(0, false), (2, true), (3, false), (3, true)] {
+        let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());
+        if sleeps {
+            bus.digits[digit].never_wakes = true;
+        } else {
+            bus.digits[digit].lose_groups = 3;
+        }
+        bus.run_until(&mut core, Stage::WaitingForZero);
+        bus.digits[digit].never_wakes = false;
+        bus.commands.push_back(Command::Zero { home: HOME });
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        let failure = if sleeps { HandFailure::DidNotWake } else { HandFailure::NoAnswer };
+        let lost = EventKind::Hand { stage: HandStage::Absent, cause: Some((Node::HAND[digit], failure)) };
+        assert!(bus.events.contains(&lost), "{:?}", bus.events);
+        bus.run(&mut core, 0.5);
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        let health = core.health();
+        assert_eq!((health.hand, health.zeroed), (HandStage::NotInitialised, true), "{:?}", bus.events);
+    }
+}
+
+/// The change that makes it fail: a start-up is begun anew as often as it fails.
+#[test]
+fn a_hand_that_never_wakes_keeps_the_arm_from_its_loop_for_three_more_start_ups_and_no_longer() {
+    let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());
+    bus.digits[1].never_wakes = true;
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.run(&mut core, 20.0);
+    let late = EventKind::Blocked(StartupError::AnswersLate(Node::HAND[1]));
+    assert_eq!(bus.events.iter().filter(|event| **event == late).count(), 3, "{:?}", bus.events);
+    assert_eq!((core.stage(), core.health().hand), (Stage::WaitingForActive, HandStage::Absent));
+    // With a new start of the pucks it is looked for anew.
+    bus.press_emergency_stop();
+    bus.run(&mut core, 1.0);
+    bus.press_idle();
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.digits[1].never_wakes = false;
+    bus.commands.push_back(Command::Zero { home: HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.run(&mut core, 0.5);
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    assert_eq!(core.health().hand, HandStage::NotInitialised, "{:?}", bus.events);
+}
+
+/// A puck that has restarted sleeps. The change that makes it fail: only a hand that is ready is watched.
+#[test]
+fn g2_a_hand_that_restarts_before_it_is_initialised_is_told_at_once_and_woken_once_the_arm_is_idle() {
+    for digit in 0..4 {
+        let (mut core, mut bus) = holding_with_hand();
+        bus.run(&mut core, 1.0);
+        assert_eq!(core.health().hand, HandStage::NotInitialised, "an awake hand is left as it is");
+        bus.digits[digit].lose_power();
+        bus.run(&mut core, 1.0);
+        let reset = EventKind::Hand { stage: HandStage::Failed, cause: Some((Node::HAND[digit], HandFailure::Reset)) };
+        assert_eq!(bus.events.last(), Some(&reset), "{:?}", bus.events);
+        assert_eq!((core.health().state, core.health().fault), (State::Hold, Fault::None));
+        bus.commands.push_back(Control::Release.into());
+        bus.run(&mut core, 3.0);
+        bus.press_idle();
+        bus.run(&mut core, 0.5);
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        assert_eq!((core.health().hand, core.health().zeroed), (HandStage::NotInitialised, true), "{:?}", bus.events);
+        bus.press_activate();
+        bus.run_until(&mut core, Stage::Ready);
+        bus.commands.extend([Control::Hold.into(), Command::InitialiseHand]);
+        bus.run(&mut core, 8.0);
+        assert_eq!((core.health().state, core.health().hand), (State::Hold, HandStage::Ready), "{:?}", bus.events);
     }
 }
 
