@@ -37,6 +37,7 @@ pub use halt::Halted;
 pub use interrupt::Interrupt;
 pub use telemetry::{Gaps, TelemetryStream};
 pub use transfer::Transfer;
+use upload::changes_store;
 pub use upload::{UploadOutcome, UploadPhase};
 
 /// Longest time for an answer, the repetitions of its request included.
@@ -325,9 +326,12 @@ impl<T: Transport> Client<T> {
         }
     }
 
-    /// As [`Client::exchange`]; waits for a device that is still reading its storage, as it does after a start.
+    /// As [`Client::exchange`]; waits for a device that is still reading its storage, as it does after a start, or that
+    /// writes a change of a host that has gone.
     fn exchange_when_read(&mut self, request: &Request) -> Result<Reply, HostError> {
-        let (end, busy) = (self.transport.now() + STORE_BUSY, StoreError::Busy.code());
+        let begins = matches!(request, Request::UploadBegin { .. });
+        let patience = if begins || changes_store(request) { STORE_TIMEOUT } else { STORE_BUSY };
+        let (end, busy) = (self.transport.now() + patience, StoreError::Busy.code());
         loop {
             match self.exchange(request) {
                 Err(HostError::Refused { reason: Refusal::StoreFailed, detail: [code, _], .. })
@@ -348,18 +352,7 @@ impl<T: Transport> Client<T> {
         let envelope = Envelope { session: self.session, sequence: of, time_ms: self.device_ms };
         self.send(envelope, request)?;
         let mut repeat_at = started + REPEAT_AFTER;
-        let timeout = match request {
-            Request::UploadCommit
-            | Request::Delete { .. }
-            | Request::Rename { .. }
-            | Request::Calibrate { .. }
-            | Request::ForgetCalibration
-            | Request::KeepWeight { .. }
-            | Request::ForgetWeight
-            | Request::KeepSecret { .. }
-            | Request::ForgetSecret => self.timeout.max(STORE_TIMEOUT),
-            _ => self.timeout,
-        };
+        let timeout = if changes_store(request) { self.timeout.max(STORE_TIMEOUT) } else { self.timeout };
         loop {
             if let Some(reply) = self.take_answer(of) {
                 let took = self.transport.now().saturating_sub(started);

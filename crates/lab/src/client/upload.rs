@@ -111,3 +111,19 @@ impl<T: Transport> Client<T> {
 fn is_same(listing: &Listing, image: &[u8]) -> bool {
     usize::try_from(listing.length) == Ok(image.len()) && listing.crc == stored_crc(image)
 }
+
+/// True if the answer comes when a change of the store is durable.
+pub(super) fn changes_store(request: &Request) -> bool {
+    matches!(
+        request,
+        Request::UploadCommit
+            | Request::Delete { .. }
+            | Request::Rename { .. }
+            | Request::Calibrate { .. }
+            | Request::ForgetCalibration
+            | Request::KeepWeight { .. }
+            | Request::ForgetWeight
+            | Request::KeepSecret { .. }
+            | Request::ForgetSecret
+    )
+}

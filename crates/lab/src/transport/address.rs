@@ -9,7 +9,8 @@
 //! unix:PATH              a Unix socket
 //! serial:PORT[@BAUD]     a serial port, 921600 baud unless said otherwise
 //! can:INTERFACE[/N]      device number N (0 unless said otherwise) on a CAN interface
-//! options: seed=7,arm=7,world=simple|mujoco,line=serial|can,bus=FILE,flash=FILE,faults=FILE, separated by commas
+//! options: seed=7,arm=7,world=simple|mujoco,line=serial|can,bus=FILE,flash=FILE,faults=FILE, separated by commas;
+//! two commas in the name of a FILE are one of it
 //! of board: also report=FILE,cancellation=skipped|stuck,revision=0xNNNN,fault=KIND@MICROSECONDS[:ARGUMENT]
 //! ```
 
@@ -155,6 +156,34 @@ mod tests {
         }
         let port = "COM3".to_owned();
         assert_eq!(parse("serial:COM3"), Ok(Address::Serial { port, baud: 921_600 }));
+    }
+
+    /// The change that makes it fail: every comma ends an option.
+    #[test]
+    fn two_commas_in_the_name_of_a_file_are_one_of_it_and_elsewhere_nothing() {
+        let text = "board:seed=3,bus=a,,b,flash=,,c,,,,d,faults=e,,f.toml:2,report=g,,";
+        let Ok(Address::Simulated(SimulatorKind::Board, options)) = parse(text) else { panic!("{:?}", parse(text)) };
+        let path = |path: &Option<PathBuf>| path.as_ref().map(|path| path.to_string_lossy().into_owned());
+        assert_eq!(path(&options.bus).as_deref(), Some("a,b"));
+        assert_eq!(path(&options.flash).as_deref(), Some(",c,,d"));
+        assert_eq!(path(&options.board.report).as_deref(), Some("g,"));
+        assert_eq!(options.faults.as_deref(), Some("e,f.toml:2"));
+        assert_eq!(parse(text).unwrap().to_string(), text);
+        assert_eq!(parse("sil:seed=7,,world=simple,"), parse("sil:seed=7,world=simple"));
+        let words = parse("sil:flash=a,b").unwrap_err().to_string();
+        assert!(words.contains("two commas"), "{words}");
+    }
+
+    /// The change that makes it fail: `-` is a name like any other.
+    #[test]
+    fn no_file_of_a_simulated_device_gets_the_name_of_standard_output() {
+        for part in ["flash=-", "bus=-", "report=-"] {
+            assert_eq!(parse(&format!("board:{part}")), Err(AddressError::StandardOutput(part.into())));
+        }
+        assert!(parse("sil:flash=./-,bus=-a").is_ok());
+        let mut options = SimulatorOptions::default();
+        let refused = options.add_files(SimulatorKind::InProcess, Some(std::path::Path::new("-")), None);
+        assert_eq!(refused, Err(AddressError::StandardOutput("flash=-".into())));
     }
 
     #[test]

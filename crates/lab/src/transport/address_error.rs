@@ -15,7 +15,7 @@ pub enum AddressError {
     Incomplete(String, &'static str),
     /// An option of a simulator that there is not.
     #[error(
-        "simulated devices have the options seed=NUMBER, arm=NUMBER, held=KG@X:Y:Z, world=NAME, line=serial|can, bus=FILE, flash=FILE and faults=FILE, not '{0}'"
+        "simulated devices have the options seed=NUMBER, arm=NUMBER, held=KG@X:Y:Z, world=NAME, line=serial|can, bus=FILE, flash=FILE and faults=FILE, not '{0}'; two commas in the name of a FILE are one of it"
     )]
     Option(String),
     /// An option of the emulated board that there is not.
@@ -29,6 +29,9 @@ pub enum AddressError {
     /// An option that this simulated device does not have.
     #[error("a hand alone has the options seed=NUMBER, world=empty, line=serial|can and bus=FILE, not '{0}'")]
     HandOption(String),
+    /// A file whose name elsewhere means standard output.
+    #[error("'{0}': elsewhere that is standard output; a file of that name is './-'")]
+    StandardOutput(String),
     /// A value that is no number, or one that is too large; the largest there is.
     #[error("'{0}': a whole number from 0 to {1} is expected")]
     Number(String, u64),

@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::AddressError;
 
+/// Options that name a file.
+const FILES: [&str; 4] = ["bus", "flash", "faults", "report"];
+
 /// Which simulated device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SimulatorKind {
@@ -102,15 +105,18 @@ impl SimulatorOptions {
     pub(super) fn parse(text: &str, kind: SimulatorKind) -> Result<Self, AddressError> {
         let is_board = kind == SimulatorKind::Board;
         let mut options = Self::default();
-        let mut given: Vec<&str> = Vec::new();
-        for part in text.split(',').filter(|part| !part.is_empty()) {
-            let name = part.split_once('=').map_or(part, |(name, _)| name);
+        let mut given: Vec<String> = Vec::new();
+        for part in &parts(text) {
+            let name = part.split_once('=').map_or(part.as_str(), |(name, _)| name);
             // Several faults befall one chip.
-            if name != "fault" && given.contains(&name) {
+            if name != "fault" && given.iter().any(|given| given == name) {
                 return Err(AddressError::Twice(name.to_owned()));
             }
-            given.push(name);
+            given.push(name.to_owned());
             refuse_of_hand(kind, name, part)?;
+            if ["bus=-", "flash=-", "report=-"].contains(&part.as_str()) {
+                return Err(AddressError::StandardOutput(part.clone()));
+            }
             match part.split_once('=').filter(|(_, value)| !value.is_empty()) {
                 Some(("seed", value)) => {
                     options.seed =
@@ -139,7 +145,8 @@ impl SimulatorOptions {
     /// option in an address, belongs to the path here.
     ///
     /// # Errors
-    /// [`AddressError::Twice`] for what the address gives as well, [`AddressError::HandOption`] for a hand alone.
+    /// [`AddressError::Twice`] for what the address gives as well, [`AddressError::HandOption`] for a hand alone,
+    /// [`AddressError::StandardOutput`] for a flash of that name.
     pub fn add_files(
         &mut self,
         kind: SimulatorKind,
@@ -148,6 +155,9 @@ impl SimulatorOptions {
     ) -> Result<(), AddressError> {
         if let Some(path) = flash {
             refuse_of_hand(kind, "flash", "flash")?;
+            if path.as_os_str() == "-" {
+                return Err(AddressError::StandardOutput("flash=-".to_owned()));
+            }
             if self.flash.replace(path.to_owned()).is_some() {
                 return Err(AddressError::Twice("flash".to_owned()));
             }
@@ -160,6 +170,28 @@ impl SimulatorOptions {
         }
         Ok(())
     }
+}
+
+/// The options of an address. A comma ends one; two in the name of a file are one of it.
+fn parts(text: &str) -> Vec<String> {
+    let (mut parts, mut part) = (Vec::new(), String::new());
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        let is_of_file = FILES.iter().any(|name| part.strip_prefix(name).is_some_and(|rest| rest.starts_with('=')));
+        if letter == ',' && !(is_of_file && letters.next_if_eq(&',').is_some()) {
+            parts.push(std::mem::take(&mut part));
+        } else {
+            part.push(letter);
+        }
+    }
+    parts.push(part);
+    parts.retain(|part| !part.is_empty());
+    parts
+}
+
+/// A name of a file as [`parts`] reads it.
+fn in_address(name: impl fmt::Display) -> String {
+    name.to_string().replace(',', ",,")
 }
 
 /// Refuses an option, `part` of an address, that a hand alone does not have.
@@ -196,10 +228,10 @@ impl fmt::Display for SimulatorOptions {
         let held = self.held.as_ref().map(|held| format!("held={held}"));
         let world = self.world.as_ref().map(|world| format!("world={world}"));
         let line = (self.line == LineKind::Can).then(|| "line=can".to_owned());
-        let bus = self.bus.as_ref().map(|path| format!("bus={}", path.display()));
-        let flash = self.flash.as_ref().map(|path| format!("flash={}", path.display()));
-        let script = self.faults.as_ref().map(|name| format!("faults={name}"));
-        let report = self.board.report.as_ref().map(|path| format!("report={}", path.display()));
+        let bus = self.bus.as_ref().map(|path| format!("bus={}", in_address(path.display())));
+        let flash = self.flash.as_ref().map(|path| format!("flash={}", in_address(path.display())));
+        let script = self.faults.as_ref().map(|name| format!("faults={}", in_address(name)));
+        let report = self.board.report.as_ref().map(|path| format!("report={}", in_address(path.display())));
         let cancellation = chip.cancellation.map(|reading| format!("cancellation={}", reading.name()));
         let revision = chip.revision.map(|revision| format!("revision={revision:#06x}"));
         let faults = chip.faults.iter().map(|fault| format!("fault={fault}"));

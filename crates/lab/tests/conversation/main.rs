@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use control::State;
 use device::Command;
-use lab::client::{Client, Halted, Incoming, Interrupt, UploadOutcome, UploadPhase};
+use lab::client::{Client, Halted, Incoming, Interrupt, STORE_TIMEOUT, UploadOutcome, UploadPhase};
 use lab::error::HostError;
 use lab::transport::{StreamTransport, Transport, TransportError};
 use link::{LINK_VERSION, Name, Refusal, Request, SCHEMA_HASH};
@@ -209,6 +209,29 @@ fn a_device_that_reads_its_storage_is_waited_for_but_not_with_what_moves() {
     let refused = client.list();
     assert!(matches!(refused, Err(HostError::Refused { reason: Refusal::StoreFailed, .. })), "{refused:?}");
     assert!(client.now() - started < Duration::from_secs(4));
+}
+
+/// The change of a host that was killed is carried out, and another one waits for it as long as its own host would have.
+/// The change of code that makes it fail: a change is given up after 3 s, as a question is.
+#[test]
+fn a_change_waits_for_the_change_of_another_host_for_the_time_that_it_may_take() {
+    let mut client = connected();
+    let nothing = Request::Delete { name: Name::new("nothing").unwrap() };
+    let calibrate = Request::Calibrate { home: [0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0] };
+    // Two erases of 4 s, and a try in 20 ms at most.
+    for (change, expected) in [(nothing, Refusal::NoSuchPrimitive), (calibrate, Refusal::HasTorque)] {
+        let started = client.now();
+        client.transport().reading = 400;
+        let refused = client.request(&change);
+        assert!(matches!(&refused, Err(HostError::Refused { reason, .. }) if *reason == expected), "{refused:?}");
+        assert!(client.now() - started >= Duration::from_secs(8), "{:?}", client.now() - started);
+    }
+    // One that never comes to an end is told as what it is.
+    client.transport().reading = u32::MAX;
+    let started = client.now();
+    let refused = client.upload(&image("reach", 1.0), |_, _, _| {});
+    assert!(matches!(refused, Err(HostError::Refused { reason: Refusal::StoreFailed, .. })), "{refused:?}");
+    assert!(client.now() - started < STORE_TIMEOUT + Duration::from_secs(1));
 }
 
 #[test]
