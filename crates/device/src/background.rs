@@ -10,6 +10,7 @@
 //! | MODE of each hand puck | 10 Hz, while there is a hand | a SET has no acknowledge, and others may set modes too |
 //! | TEMP | 1 Hz for each puck | heat |
 //! | STAT of sensor or hand, if the start-up missed it | 10 Hz, in turn | the arm carries it all the same |
+//! | STAT of a sensor that measures nothing | 10 Hz, while the arm is IDLE | one that has restarted has to be woken |
 //! | STAT of one puck of a hand, missed or lost | 10 Hz, while the arm is IDLE | the hand comes back with it |
 //! | STAT of each puck of a hand that is not initialised | 1 Hz and more | one that has restarted has to be woken |
 //!

@@ -148,7 +148,7 @@ pub enum StartupError {
         /// Number of the joint.
         joint: u8,
     },
-    /// The sensor or the hand answers now and did not at the start-up.
+    /// The sensor or the hand answers now, and did not at the start-up or since it has restarted.
     AnswersLate(Node),
     /// The zeroing of an arm was broken off.
     ZeroUnfinished,
@@ -226,11 +226,7 @@ impl fmt::Display for StartupError {
             }
             StartupError::ZeroUnfinished => formatter.write_str("zeroing was broken off: zero the arm"),
             StartupError::AnswersLate(node) => {
-                write!(
-                    formatter,
-                    "node {} answers now and did not at the start-up: everything is asked anew",
-                    node.number()
-                )
+                write!(formatter, "node {} answers now and did not before: everything is asked anew", node.number())
             }
         }
     }

@@ -214,6 +214,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.wrench.is_tared()
     }
 
+    /// Control periods since the last wrench that was measured; `None` if there was none since the bus was started.
+    pub fn wrench_age(&self) -> Option<u8> {
+        self.wrench.age()
+    }
+
     /// Takes the scales read from the pucks. Positions are learned anew, and a primitive that was for another payload
     /// is forgotten.
     ///

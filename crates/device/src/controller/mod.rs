@@ -46,6 +46,8 @@ use outlet::SlotOutlet;
 /// Time that a puck may be silent before the bus is started anew: 1 s, in control periods; long after the supervisor
 /// has taken the torque off.
 const SILENT_CYCLES: u16 = periods(1.0);
+/// Control periods without a wrench after which the sensor of an arm that rests is asked whether it sleeps: 0.2 s.
+const SILENT_SENSOR: u8 = periods(0.2) as u8;
 /// Unanswered questions to the safety module that mean it is gone: 100 ms, one question in two control periods.
 const SAFETY_SILENCE: u16 = periods(0.1) / 2;
 /// Cycles between a fault of the bus and the new start-up: three of zero torque, and time to ask the safety module for
@@ -204,7 +206,13 @@ impl DeviceController {
                 }
             }
             PollReply::Present(node, value) => {
-                if !self.hand.hear_status(node, value) {
+                let is_ready = Status::from_value(value) == Some(Status::Ready);
+                let is_told = if node == Node::FORCE_TORQUE {
+                    is_ready && self.startup.has_sensor()
+                } else {
+                    self.hand.hear_status(node, is_ready)
+                };
+                if !is_told {
                     self.late = Some(node);
                 }
             }
@@ -414,8 +422,10 @@ impl DeviceController {
             return;
         }
         let rests = self.safety_mode == Some(SafetyMode::Idle) && !self.cycle.state().has_torque();
-        let (sensor, digit) = self.startup.absent(rests);
-        let absent = (sensor, digit.or_else(|| self.hand.puck_in_doubt(self.number, rests)));
+        let (missing, digit) = self.startup.absent(rests);
+        // One that has restarted sleeps, and nothing but a start-up wakes it.
+        let silent = rests && self.cycle.wrench_age().is_none_or(|age| age >= SILENT_SENSOR);
+        let absent = (missing || silent, digit.or_else(|| self.hand.puck_in_doubt(self.number, rests)));
         let question = match (poll.begin(), self.round.suspect()) {
             (Some(safety), _) => Some(safety),
             (None, Some(node)) => Some(poll.suspect(node)),

@@ -148,12 +148,12 @@ impl Hand {
         }
     }
 
-    /// The sensor or a puck of the hand has told its STAT; false if it is one that was missed, or lost.
-    pub(crate) fn hear_status(&mut self, node: Node, value: i32) -> bool {
-        if node.hand_index().is_none() || matches!(self.stage, HandStage::Absent | HandStage::Failed) {
+    /// A puck has told its STAT; false if it is one that was missed, or lost.
+    pub(crate) fn hear_status(&mut self, node: Node, is_ready: bool) -> bool {
+        if matches!(self.stage, HandStage::Absent | HandStage::Failed) {
             return false;
         }
-        if self.stage == HandStage::NotInitialised && Status::from_value(value) != Some(Status::Ready) {
+        if self.stage == HandStage::NotInitialised && !is_ready {
             self.fail(node, HandFailure::Reset);
         }
         true

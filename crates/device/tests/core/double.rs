@@ -126,6 +126,8 @@ pub(crate) struct Bus {
     pub(crate) sensor_present: bool,
     pub(crate) sensor_awake_at: Option<u64>,
     pub(crate) sensor: RawWrench,
+    /// What it measures does not arrive.
+    pub(crate) lose_wrenches: bool,
     /// The controller has no room for this many more frames.
     pub(crate) refuse: u32,
     /// The controller takes no torque frames.
@@ -166,6 +168,7 @@ impl Bus {
             sensor_present: true,
             sensor_awake_at: None,
             sensor: RawWrench { force: [256, 0, 0], torque: [0, 0, 0], status: None },
+            lose_wrenches: false,
             refuse: 0,
             refuse_torques: false,
             deaf: false,
@@ -458,6 +461,7 @@ impl Bus {
                 let status = if awake { Status::Ready } else { Status::Reset };
                 self.answer_value(Node::FORCE_TORQUE, PropertyId::STAT, status.value(), false);
             }
+            Action::Get { property: PropertyId::FORCE_TORQUE } if self.lose_wrenches => {}
             Action::Get { property: PropertyId::FORCE_TORQUE } if awake => {
                 self.answer(0, force_frame(self.sensor.force));
                 self.answer(0, torque_frame(self.sensor.torque, self.sensor.status));

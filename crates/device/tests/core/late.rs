@@ -48,6 +48,56 @@ fn g4_a_sensor_that_answers_late_is_found_before_torque_or_stops_it_softly() {
     }
 }
 
+/// A sensor that has restarted sleeps, and a start-up alone wakes it. The change that makes it fail: only a sensor that
+/// the start-up missed is looked for.
+#[test]
+fn g8_a_sensor_that_restarts_is_woken_and_gets_another_zero_once_the_arm_is_idle() {
+    for torque in [false, true] {
+        let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        bus.run(&mut core, 1.0);
+        assert_eq!((core.stage(), core.health().wrench_zeroed), (Stage::WaitingForActive, Some(true)));
+        if torque {
+            bus.press_activate();
+            bus.run_until(&mut core, Stage::Ready);
+            bus.commands.push_back(Control::Hold.into());
+            bus.run(&mut core, 0.5);
+        }
+        bus.sensor_awake_at = None;
+        bus.run(&mut core, 1.0);
+        if torque {
+            assert_eq!((core.health().state, core.health().fault), (State::Hold, Fault::None), "a hold goes on");
+            bus.commands.push_back(Control::Release.into());
+            bus.run(&mut core, 3.0);
+            bus.press_idle();
+            bus.run(&mut core, 1.0);
+        }
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        bus.run(&mut core, 1.0);
+        assert!(bus.sensor_awake_at.is_some(), "{:?}", bus.events);
+        let health = core.health();
+        assert_eq!((health.fault, health.zeroed, health.wrench_zeroed), (Fault::None, true, Some(true)));
+        bus.press_activate();
+        bus.run_until(&mut core, Stage::Ready);
+        bus.commands.push_back(Control::Hold.into());
+        bus.run(&mut core, 0.5);
+        assert_eq!((core.health().state, core.health().fault), (State::Hold, Fault::None), "{:?}", bus.events);
+        let last = bus.records.last().expect("cycles");
+        assert_eq!(last.flags & control::flags::CONTACT_UNSEEN, 0);
+    }
+}
+
+/// One that is awake and whose measurements are lost is no reason to begin anew. The change that makes it fail: any
+/// answer of a silent sensor is.
+#[test]
+fn a_sensor_whose_measurements_are_lost_and_that_is_awake_does_not_have_the_start_up_begun_anew() {
+    let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    bus.lose_wrenches = true;
+    bus.run(&mut core, 5.0);
+    assert_eq!((core.stage(), core.health().counters.restarts), (Stage::WaitingForActive, 0), "{:?}", bus.events);
+}
+
 #[test]
 fn g4_one_lost_question_to_the_sensor_does_not_decide_what_the_arm_carries() {
     let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
