@@ -82,8 +82,8 @@ enum Step {
     ReadHand { digit: u8, item: u8 },
     /// Ask whether the arm is zeroed.
     AskZero,
-    /// Wait for a person; look at the safety module from this time on.
-    AwaitZero { next_us: u64 },
+    /// Wait for a person; look at the safety module or a puck, in turn, from this time on.
+    AwaitZero { next_us: u64, look: u8 },
     /// Ask whether the arm is IDLE, until this time; before it is looked at, and again before its positions are
     /// rewritten.
     ConfirmIdle { until_us: Option<u64>, rests: bool },
@@ -497,7 +497,7 @@ impl Startup {
                 let frame = set(Node::SAFETY_MODULE, self.safety()?.zero, 0);
                 Ok(after(outlet.send(frame), Step::RevokeZero { word: word + 1 }))
             }
-            Step::AwaitZero { next_us } => self.await_zero(next_us, outlet),
+            Step::AwaitZero { next_us, look } => self.await_zero(next_us, look, outlet),
             Step::ConfirmIdle { until_us, rests } => self.confirm_idle(until_us, rests, outlet),
             Step::AwaitRest(rest) => self.await_rest(rest, outlet),
             Step::IgnoreFaults { until_us } | Step::WritePosition { until_us, .. } if outlet.now_us() >= until_us => {

@@ -1,12 +1,12 @@
 //! The second half of the start-up: a person says where the arm stands, the pucks and the safety module are told.
 
-use puck::{Counts, Group, Node, PropertyId, SafetyMode, get, set};
+use puck::{Counts, Group, Node, PropertyId, SafetyMode, Status, get, set};
 
 use super::continuity::Continuity;
 use super::home::home_counts;
 use super::rest::Rest;
 use super::{Next, POLL_US, REVOCATIONS, Startup, Step, ZeroRequest, after};
-use crate::bus::Outlet;
+use crate::bus::{Answer, Outlet};
 use crate::command::Refusal;
 use crate::stage::StartupError;
 
@@ -117,12 +117,30 @@ impl Startup {
     /// nobody would ask it.
     pub(super) fn await_next_zero(&self, outlet: &mut impl Outlet) -> Next {
         let next_us = outlet.now_us() + POLL_US;
-        Next::Go(if self.from_loop { Step::Tare } else { Step::AwaitZero { next_us } })
+        Next::Go(if self.from_loop { Step::Tare } else { Step::AwaitZero { next_us, look: 0 } })
     }
 
-    pub(super) fn await_zero(&mut self, next_us: u64, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
+    /// Every other look is for a puck: one that restarts meanwhile has to be woken before a person zeroes the arm.
+    pub(super) fn await_zero(
+        &mut self,
+        next_us: u64,
+        look: u8,
+        outlet: &mut impl Outlet,
+    ) -> Result<Next, StartupError> {
         if outlet.now_us() < next_us {
             return Ok(Next::Stay);
+        }
+        let go_on = |now_us: u64| {
+            let look = (look + 1) % (2 * Node::ARM.len() as u8);
+            Ok(Next::Go(Step::AwaitZero { next_us: now_us + POLL_US / 2, look }))
+        };
+        if let (1, Some(node)) = (look % 2, Node::ARM.get(usize::from(look / 2)).copied()) {
+            return match self.exchange.ask(node, PropertyId::STAT, outlet) {
+                Answer::Pending => Ok(Next::Stay),
+                Answer::Value(status) if status != Status::Ready.value() => Err(StartupError::CountsAnew(node)),
+                // Who is silent is told by who needs it.
+                Answer::Value(_) | Answer::Silent => go_on(outlet.now_us()),
+            };
         }
         let Some(mode) = self.ask_safety(PropertyId::MODE, outlet)? else {
             return Ok(Next::Stay);
@@ -131,7 +149,7 @@ impl Startup {
             self.power_is_off();
             return Ok(Next::Stay);
         }
-        Ok(Next::Go(Step::AwaitZero { next_us: outlet.now_us() + POLL_US }))
+        go_on(outlet.now_us())
     }
 
     /// The pucks have lost power, and with it everything read and written. A doubt stays: the word may be wrong.

@@ -103,3 +103,39 @@ fn g2_a_doubt_outlives_an_emergency_stop_that_was_none() {
         assert_eq!(health.blocked, Some(StartupError::CountsAnew(Node::ARM[3])));
     }
 }
+
+/// The change that makes it fail: nobody looks at the pucks while a person is awaited, and the zeroing is the first to
+/// find that one sleeps.
+#[test]
+fn g2_a_puck_that_restarts_while_zeroing_is_awaited_is_woken_before_it_and_costs_no_second_zeroing() {
+    for joint in 0..7 {
+        let (mut core, mut bus) = (silent_device(), Bus::idle());
+        bus.run_until(&mut core, Stage::WaitingForZero);
+        bus.run(&mut core, 5.0);
+        assert!(!bus.events.iter().any(|event| matches!(event, EventKind::Blocked(_))), "{:?}", bus.events);
+        bus.pucks[joint].awake_at = None;
+        bus.run(&mut core, 2.0);
+        let reason = EventKind::Blocked(StartupError::CountsAnew(Node::ARM[joint]));
+        assert!(bus.events.contains(&reason), "{:?}", bus.events);
+        bus.run_until(&mut core, Stage::WaitingForZero);
+        bus.commands.push_back(Command::Zero { home: HOME });
+        bus.run(&mut core, 0.2);
+        assert_eq!(bus.events.iter().filter(|event| **event == EventKind::Accepted).count(), 1, "{:?}", bus.events);
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        assert_eq!((core.health().zeroed, core.health().blocked), (true, None));
+    }
+}
+
+/// A puck whose answers are lost is told by who needs them, not by who looks.
+#[test]
+fn a_puck_that_does_not_tell_its_state_while_zeroing_is_awaited_changes_nothing() {
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.pucks[3].lose_properties = u32::MAX;
+    bus.run(&mut core, 5.0);
+    assert_eq!((core.stage(), core.health().blocked), (Stage::WaitingForZero, None), "{:?}", bus.events);
+    // And an emergency stop is noticed all the same.
+    bus.press_emergency_stop();
+    bus.run(&mut core, 1.0);
+    assert_ne!(core.stage(), Stage::WaitingForZero);
+}
