@@ -21,7 +21,7 @@ use crate::act::limit::{LimitReport, TorqueLimiter};
 use crate::command::Refusal;
 use crate::cycle::hand::HandDrive;
 use crate::cycle::law::{Lag, Law, Posture, Running};
-use crate::cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags};
+use crate::cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags, limit_flags};
 use crate::guard::disagreement::{Effort, Plan};
 use crate::guard::fault::{Fault, ReactionOutside};
 use crate::guard::joint_limits::JointBounds;
@@ -594,12 +594,4 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         set
     }
-}
-
-fn limit_flags(report: LimitReport) -> u32 {
-    let bit = |set: bool, flag: u32| if set { flag } else { 0 };
-    bit(report.joint, flags::JOINT_LIMITED)
-        | bit(report.motor, flags::MOTOR_LIMITED)
-        | bit(report.rate, flags::RATE_LIMITED)
-        | bit(report.not_finite, flags::NOT_FINITE)
 }

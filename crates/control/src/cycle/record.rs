@@ -1,6 +1,7 @@
 //! Input, output and record of one control cycle.
 
 use crate::act::actuation::Actuation;
+use crate::act::limit::LimitReport;
 use crate::command::{Command, Refusal};
 use crate::guard::fault::Fault;
 use crate::guard::supervisor::State;
@@ -160,4 +161,13 @@ impl CycleRecord {
         surprise: 0.0,
         lost_replies: 0,
     };
+}
+
+/// The flags of what the limiter cut.
+pub(super) fn limit_flags(report: LimitReport) -> u32 {
+    let bit = |set: bool, flag: u32| if set { flag } else { 0 };
+    bit(report.joint, flags::JOINT_LIMITED)
+        | bit(report.motor, flags::MOTOR_LIMITED)
+        | bit(report.rate, flags::RATE_LIMITED)
+        | bit(report.not_finite, flags::NOT_FINITE)
 }

@@ -126,7 +126,7 @@ pub(crate) struct Bus {
     pub(crate) sensor_present: bool,
     pub(crate) sensor_awake_at: Option<u64>,
     pub(crate) sensor: RawWrench,
-    /// What it measures does not arrive.
+    /// True while its measurements do not arrive.
     pub(crate) lose_wrenches: bool,
     /// The controller has no room for this many more frames.
     pub(crate) refuse: u32,

@@ -211,7 +211,8 @@ fn a_device_that_reads_its_storage_is_waited_for_but_not_with_what_moves() {
     assert!(client.now() - started < Duration::from_secs(4));
 }
 
-/// The change of a host that was killed is carried out, and another one waits for it as long as its own host would have.
+/// The change of a host that was killed is carried out, and another one waits for it as long as its own host would
+/// have.
 /// The change of code that makes it fail: a change is given up after 3 s, as a question is.
 #[test]
 fn a_change_waits_for_the_change_of_another_host_for_the_time_that_it_may_take() {
