@@ -276,6 +276,17 @@ fn a_changed_torque_is_found_at_its_line() {
     assert_eq!((&told["error"]["code"], &told["result"]["different"]), (&"E672".into(), &1.into()));
 }
 
+/// Guards that a log of the arm's bus alone, which no replay can reproduce, is answered with the way to log both.
+#[test]
+fn a_log_without_the_hosts_orders_is_answered_with_the_line_that_logs_them() {
+    let (_, log) = recorded();
+    let alone: String = log.lines().filter(|line| line.contains(" can0 ")).map(|line| format!("{line}\n")).collect();
+    let (folder, _file) = log_file(&alone);
+    let words = stderr(&tactus(folder.path(), &["can", "replay", "bus.log"]).code(6));
+    assert!(words.contains("error[E672]") && words.contains("the log does not hold the host's bus"), "{words}");
+    assert!(words.contains("`tactus --device sil:line=can run PRIMITIVE --bus-log FILE`"), "{words}");
+}
+
 #[test]
 fn a_frame_too_many_and_a_frame_too_few_are_told_apart() {
     let (_, log) = recorded();

@@ -42,6 +42,32 @@ fn a_wrong_command_line_is_answered_with_a_line_that_shows_what_its_command_take
     }
 }
 
+/// Guards that `learn` and `rename` give no name that `tactus run` would take for a file.
+#[test]
+fn no_primitive_gets_a_name_that_run_takes_for_a_file() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    let words = "`tactus run x.toml` means a file; without the ending it is `x`";
+    for line in ["learn demo.csv --name x.toml -o y.toml", "learn demo.csv -o x.toml.toml"] {
+        let (exit, code, message, _) = refused(at, line);
+        assert!(exit == 2 && code == "E220" && message.contains(words), "{line}: {exit} {code}: {message}");
+    }
+    assert!(!at.join("y.toml").exists() && !at.join("x.toml.toml").exists());
+    let (exit, code, message, _) = refused(at, &format!("{DEVICE} rename reach x.toml"));
+    assert!(exit == 2 && code == "E200" && message.contains(words), "{exit} {code}: {message}");
+}
+
+/// Guards that a setting without a value is answered with the line that gives it one, and a wrong name with the names.
+#[test]
+fn a_setting_without_a_value_is_answered_with_the_line_that_sets_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (exit, code, _, help) = refused(folder.path(), &format!("{DEVICE} config set home.joint_4_rad 3.1"));
+    assert_eq!((exit, code.as_str()), (2, "E238"));
+    assert!(help.contains("`tactus config set home.joint_4_rad=VALUE`"), "{help}");
+    let (_, _, _, help) = refused(folder.path(), &format!("{DEVICE} config set nosuch"));
+    assert!(help.contains("`tactus config get`") && !help.contains("VALUE"), "{help}");
+}
+
 #[test]
 fn a_script_is_told_what_is_wrong_with_a_command_line_as_a_person_is() {
     let folder = tempfile::tempdir().unwrap();
@@ -343,10 +369,15 @@ fn degrees_and_absurd_numbers_are_told_as_such_on_one_line() {
     let line = text.lines().nth(50).unwrap();
     let mut fields: Vec<&str> = line.split(',').collect();
     let joint = text.lines().find(|line| line.contains("q1_rad")).unwrap().split(',').position(|name| name == "q1_rad");
-    fields[joint.unwrap()] = "1e300";
-    std::fs::write(at.join("absurd.csv"), text.replace(line, &fields.join(","))).unwrap();
-    let (_, code, message, _) = refused(at, "learn absurd.csv -o a.toml");
-    assert!(code == "E621" && message.contains("1.0e300 rad: are these degrees?"), "{code}: {message}");
+    for (value, told, words) in [
+        ("1e9", "E621", "1.0e9 rad: are these degrees?"),
+        ("1e300", "E620", "1e300 is larger than any value of a recording"),
+    ] {
+        fields[joint.unwrap()] = value;
+        std::fs::write(at.join("absurd.csv"), text.replace(line, &fields.join(","))).unwrap();
+        let (_, code, message, _) = refused(at, "learn absurd.csv -o a.toml");
+        assert!(code == told && message.contains(words), "{code}: {message}");
+    }
     let (_, code, _, help) = refused(at, "learn demo.csv -o a.toml --dwell -1");
     assert!(code == "E221" && help.contains("tactus learn --help"), "{code}: {help}");
 }

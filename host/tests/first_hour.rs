@@ -6,7 +6,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common;
-use crate::tool::{heeding, said, tactus};
+use crate::tool::{self, heeding, said, tactus};
 
 /// The program under a shell that lets no file grow: it stands for a full disk.
 fn without_room(folder: &Path, line: &str) -> Output {
@@ -136,8 +136,13 @@ fn a_socket_at_which_nobody_serves_is_no_cable() {
     for socket in ["dead.sock", "none.sock"] {
         let refused = tactus(folder, &format!("--device unix:{socket} list"));
         assert_eq!(refused.status.code(), Some(3), "{}", said(&refused));
-        let help = format!("`tactus sim --listen unix:{socket}`");
+        let serving = format!("--device sil: sim --listen unix:{socket}");
+        let help = format!("`tactus {serving}`");
         assert!(said(&refused).contains(&help) && !said(&refused).contains("cable"), "{}", said(&refused));
+        // It serves where the environment names the socket, too: this is how such a device is usually named.
+        let mut served = tool::command(folder, format!("{serving} --duration 0.1 --fast").as_str());
+        let served = served.env("TACTUS_DEVICE", format!("unix:{socket}")).output().unwrap();
+        assert!(served.status.success(), "{}", said(&served));
     }
     // Where no arm can be served either, nobody is told to serve one there.
     std::fs::write(folder.join("a.csv"), "").unwrap();

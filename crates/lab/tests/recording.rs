@@ -54,6 +54,17 @@ fn infinity_is_refused_with_its_place() {
     names(&error, 41, column("fx_N") + 1);
 }
 
+/// Guards `plot` and `report`, which drew a flat line beside a value with a damaged exponent.
+#[test]
+fn a_value_that_nothing_measures_is_refused_with_its_place_and_a_large_one_is_not() {
+    for value in ["1e300", "-1.2e13"] {
+        let error = parse(&with_field(42, "q1_rad", value)).unwrap_err();
+        assert!(matches!(error, RecordingError::TooLarge { .. }), "{error}");
+        names(&error, 42, column("q1_rad") + 1);
+    }
+    assert!(parse(&with_field(42, "dq1_rad_s", "2e9")).is_ok());
+}
+
 #[test]
 fn text_in_a_number_is_refused_with_its_place() {
     let error = parse(&with_field(7, "x_m", "0.3m")).unwrap_err();

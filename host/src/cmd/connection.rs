@@ -168,7 +168,9 @@ fn reach(
 fn socket_help(address: &Address, error: &TransportError) -> Option<String> {
     let nobody = || {
         let address = quoted::text(&address.to_string());
-        format!("nobody serves there: `tactus sim --listen {address}` serves a simulated arm, in a terminal of its own")
+        // Without the device, TACTUS_DEVICE would name this very socket, which can serve nothing.
+        let serving = format!("tactus --device sil: sim --listen {address}");
+        format!("nobody serves there: `{serving}` serves a simulated arm, in a terminal of its own")
     };
     match (address, error) {
         (Address::Unix(path), TransportError::Permission { .. }) => {

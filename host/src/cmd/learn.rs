@@ -103,7 +103,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Some(name) => name.clone(),
         None => file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
     };
-    if let Err(error) = link::Name::new(&name) {
+    if let Err(error) = super::rename::new_name(&name) {
         if command.name.is_none() {
             // A place that is none for a file has no name to give either.
             drop(files::create(&file, global, &[&command.demonstration], "learn")?);

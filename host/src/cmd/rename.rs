@@ -15,8 +15,21 @@ pub struct Cmd {
     #[arg(value_name = "OLD")]
     pub old: Name,
     /// Its name from then on
-    #[arg(value_name = "NEW")]
+    #[arg(value_name = "NEW", value_parser = new_name)]
     pub new: Name,
+}
+
+/// A name to give to a primitive. One that ends as a file of one does names nothing that `tactus run` could play from
+/// the device: there it means the file.
+///
+/// # Errors
+/// It is none, or has that ending.
+pub(super) fn new_name(text: &str) -> Result<Name, String> {
+    let name = Name::new(text).map_err(|error| error.to_string())?;
+    match text.strip_suffix(".toml") {
+        Some(stem) => Err(format!("`tactus run {text}` means a file; without the ending it is `{stem}`")),
+        None => Ok(name),
+    }
 }
 
 /// Renames a primitive.

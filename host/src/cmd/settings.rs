@@ -131,7 +131,13 @@ fn get(command: &Get, global: &Global) -> Result<(), Failure> {
 fn set(command: &Set, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "config set";
     let changes = command.changes.iter().map(|change| {
-        let (name, value) = change.split_once('=').ok_or_else(|| unknown(format!("'{change}' has no `=`"), DOING))?;
+        let (name, value) = change.split_once('=').ok_or_else(|| {
+            let failure = unknown(format!("'{change}' has no `=`"), DOING);
+            match change.parse::<Key>() {
+                Ok(key) => failure.help(format!("`tactus config set {key}=VALUE`; `tactus config get {key}` shows it")),
+                Err(_) => failure,
+            }
+        })?;
         let key = name.trim().parse::<Key>().map_err(|error| unknown(error, DOING))?;
         let value = value.trim().parse().map_err(|error| unknown(format!("{key}: '{value}' is {error}"), DOING))?;
         Ok((key, value))

@@ -144,6 +144,14 @@ pub enum RecordingError {
         /// The value found there.
         value: f64,
     },
+    /// A field is larger than any that a device writes: drawn, it would flatten everything else.
+    #[error("{place}: {value:.0e} is larger than any value of a recording")]
+    TooLarge {
+        /// Where.
+        place: Place,
+        /// The value found there.
+        value: f64,
+    },
     /// Time does not increase from one line to the next.
     #[error("{place}: time does not go on: {time} s after {before} s")]
     TimeRunsBackwards {

@@ -19,6 +19,9 @@ pub const FEWEST_SAMPLES: usize = control::time::periods(0.2) as usize;
 /// not rounding but a wrong column or a wrong convention.
 pub const QUATERNION_NORM_TOLERANCE: f64 = 5e-3;
 
+/// No value of a recording is larger: counters end at 4e9, seconds since 1970 are 2e9.
+const LARGEST_VALUE: f64 = 1e12;
+
 /// Two samples further apart than this many typical sample periods have a gap between them.
 const GAP_FACTOR: f64 = 1.5;
 
@@ -406,6 +409,9 @@ impl<'a> Table<'a> {
             })?;
             if !value.is_finite() {
                 return Err(RecordingError::NotFinite { place: place(column, &self.names), value });
+            }
+            if value.abs() > LARGEST_VALUE {
+                return Err(RecordingError::TooLarge { place: place(column, &self.names), value });
             }
             row.push(value);
         }

@@ -52,7 +52,8 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             let frames =
                 if outcome.different == 1 { "frame of the device differs" } else { "frames of the device differ" };
             let cause = format!("{} {frames}, first: {}", outcome.different, told(first));
-            Failure::new(ErrorCode::ReplayDiffers, DOING, cause)
+            let failure = Failure::new(ErrorCode::ReplayDiffers, DOING, cause);
+            if outcome.has_host { failure } else { failure.help(BOTH_BUSES) }
         }
     };
     if !global.json {
@@ -63,6 +64,10 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Err(_) => failure,
     })
 }
+
+/// Remedy for a log without the host's orders.
+const BOTH_BUSES: &str = "the log has to hold the orders of the host as well; of a simulated arm it does where the host's line is CAN: \
+                          `tactus --device sil:line=can run PRIMITIVE --bus-log FILE`";
 
 fn text(outcome: &Outcome) -> String {
     let mut text = format!(
