@@ -250,3 +250,25 @@ fn a_rehearsal_that_ends_early_says_that_nothing_of_it_is_kept_or_where_it_is() 
     assert!(!failed.contains("is kept; ") && failed.contains("kept/reach-1.csv.part"), "{failed}");
     assert!(at.join("kept/reach-1.csv.part").exists());
 }
+
+/// A hand that is pushed aside as the arm comes to the start is beside it for a second or two: the device refuses the
+/// run, and nobody who reads "the arm is not near the start" knows that it would be, if asked again.
+///
+/// The change that makes it fail: the run is asked for as soon as the approach has ended.
+#[test]
+fn a_run_waits_for_an_arm_that_was_pushed_aside_on_its_way_to_the_start() {
+    let folder = learned(3.0, "");
+    let at = folder.path();
+    let run = |lasts: f64| {
+        let script = format!(
+            "[[scenario]]\nname = \"a push\"\nfrom = \"hold\"\n\
+             inject = [{{ at = 8.0, lasts = {lasts}, what.push.force = [0, 15, 0] }}]\n"
+        );
+        std::fs::write(at.join("push.toml"), script).unwrap();
+        tactus(at, "--device sil:world=simple,faults=push.toml --non-interactive run reach.toml --mode open")
+    };
+    run(2.5).success();
+    // Somebody who goes on pushing is not waited for.
+    let refused = run(60.0).failure().code(5);
+    assert!(stderr(&refused).contains("E526"), "{}", stderr(&refused));
+}

@@ -69,6 +69,9 @@ pub(super) fn within(
     wait_for("the move to the posture", LONGEST_TRAVEL, client, progress)
 }
 
+/// Longest time for which an arm that something has pushed aside on its way is waited for.
+const COMING_BACK: Duration = Duration::from_secs(5);
+
 /// A joint farther than this from the start posture makes the arm go there first, rad; the device refuses at 50 mrad.
 const START_TOLERANCE: f64 = 0.02;
 
@@ -95,6 +98,11 @@ pub fn go_to_start(
         hold(client)?;
     } else if !holds || far(&status.q, &start.posture, START_TOLERANCE) {
         travel(client, start.posture.map(|angle| angle as f32), progress)?;
+        // What was in its way has let its springs go, and it comes back slowly.
+        let end = client.now() + COMING_BACK;
+        while client.now() < end && far(&client.status()?.q, &start.posture, START_TOLERANCE) {
+            pass(client, REST_TRY, EndCondition::OnAnyStop)?;
+        }
     }
     let status = client.status()?;
     if status.hand_stage == HandStage::Ready && far(&status.hand, &start.hand, HAND_TOLERANCE) {
