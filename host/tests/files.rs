@@ -18,7 +18,7 @@ const DEVICE: &str = "--device sil:world=simple --non-interactive";
 
 #[test]
 fn no_command_replaces_a_file_unless_it_is_forced() {
-    let folder = learned(2.0);
+    let folder = learned(3.0);
     let at = folder.path();
     std::fs::write(at.join("there"), "precious").unwrap();
     std::fs::write(at.join("there.png"), "precious").unwrap();
@@ -48,7 +48,7 @@ fn no_command_replaces_a_file_unless_it_is_forced() {
 
 #[test]
 fn h14_an_output_that_is_an_input_a_device_or_a_folder_is_refused_even_when_forced() {
-    let folder = learned(2.0);
+    let folder = learned(3.0);
     let at = folder.path();
     let demonstration = std::fs::read(at.join("demo.csv")).unwrap();
     for (line, code) in [
@@ -88,7 +88,7 @@ fn a_flash_and_a_script_with_a_comma_in_their_names_are_these_files() {
 
 #[test]
 fn h14_a_file_that_is_named_twice_as_an_output_or_as_a_log_is_refused_before_anything_is_written() {
-    let folder = learned(2.0);
+    let folder = learned(3.0);
     let at = folder.path();
     tactus(at, "--device sil:world=simple,flash=arm.flash list").success();
     std::fs::write(at.join("there.png"), "precious").unwrap();
@@ -117,7 +117,7 @@ fn h14_a_file_that_is_named_twice_as_an_output_or_as_a_log_is_refused_before_any
 
 #[test]
 fn a_refused_teach_leaves_the_recording_that_it_was_to_replace() {
-    let folder = learned(2.0);
+    let folder = learned(3.0);
     let at = folder.path();
     let before = std::fs::read(at.join("demo.csv")).unwrap();
     // There is no hand-guided arm behind this address.
@@ -228,7 +228,7 @@ fn a_disk_that_fills_up_is_named_as_such_and_keeps_what_fits() {
 
 #[test]
 fn a_closed_pipe_and_a_full_output_are_no_crash() {
-    let folder = learned(2.0);
+    let folder = learned(3.0);
     let program = env!("CARGO_BIN_EXE_tactus");
     let run = |line: &str| {
         let line = format!("set -o pipefail; {line}");
@@ -271,7 +271,7 @@ fn names_that_are_no_unicode_are_written_and_reported() {
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
 
-    let folder = learned(2.0);
+    let folder = learned(3.0);
     let name = OsStr::from_bytes(b"b\xffd.toml");
     let run = |arguments: &[&OsStr]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tactus"));
