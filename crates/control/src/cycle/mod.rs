@@ -419,7 +419,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 pressing: Some(pressing),
                 desired: controller.desired(),
                 breaking_away: 0,
-                plan: Plan::Run,
+                plan: Plan::Run { observer: &self.observer, friction: controller.friction() },
             }),
             _ => None,
         };

@@ -10,6 +10,7 @@ use crate::model::friction::{self, SWING};
 use crate::model::kinematics::Frames;
 use crate::model::wam7;
 use crate::real::{Real, at_least};
+use crate::sense::observer::MotionObserver;
 use crate::time::few_periods;
 use crate::units::{JOINTS, Vector6, Vector7, Wrench};
 
@@ -21,12 +22,12 @@ const MOVING: f64 = 1.0;
 /// has turned by a count. 25 ms, in control periods.
 const LETTING_GO: u8 = few_periods(0.025);
 
-/// Largest swing of a motor in an approach, in parts of [`SWING`]: all joints move at once, up to half of their limits,
-/// and what the model does not know of the dynamics swings with them.
-const IN_APPROACH: f64 = 3.5 / SWING;
+/// Largest swing of a motor that a plan moves, in parts of [`SWING`]: all joints move at once, up to half of their
+/// limits, and what the model does not know of the dynamics swings with them.
+const IN_MOTION: f64 = 3.5 / SWING;
 
-/// Swing of the torque that measured motion asks for beyond which the torque that was sent is not looked at, in parts
-/// of [`SWING`]: a motor that runs away unseen is damped by what the observer believes, and time presses.
+/// Swing of the torque that measured motion asks for in an approach, beyond which the one that was sent is not looked
+/// at, in parts of [`SWING`]: a motor that runs away unseen is damped by what the observer believes, and time presses.
 const UNDENIABLE: f64 = 4.0 / SWING;
 
 /// Swing of the torque of the environment from which on a motor meets something, in parts of the largest swing.
@@ -66,19 +67,25 @@ const PUSHING: u8 = few_periods(0.01);
 const OBVIOUS: u8 = CONTRADICTING / PUSHING;
 
 /// Source of the motion that is asked of the joints.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Plan {
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Plan<'a, R: Real> {
     /// A posture that is held, or approached.
     Approach,
     /// A primitive.
-    Run,
+    Run {
+        /// Source of the torque that accelerates the joints.
+        observer: &'a MotionObserver<R>,
+        /// Friction that was fed forward (N m).
+        friction: &'a Vector7<R>,
+    },
 }
 
 /// Torques and motion that a law asks of the joints.
 pub(crate) struct Effort<'a, R: Real> {
     /// Torque of the joint feedback as measured motion alone asks for it (N m).
     pub(crate) feedback: &'a Vector7<R>,
-    /// Torque that was sent against friction (N m): fed back, fed forward, and added for a motor to break away.
+    /// Torque that was sent against friction (N m): fed back, and in an approach fed forward, and added for a motor to
+    /// break away.
     pub(crate) sent: Vector7<R>,
     /// Torque of the force control (N m), if there is one: it presses on the environment.
     pub(crate) pressing: Option<&'a Vector7<R>>,
@@ -87,7 +94,7 @@ pub(crate) struct Effort<'a, R: Real> {
     /// Motors that are made to break away, one bit each, M1 lowest.
     pub(crate) breaking_away: u8,
     /// Where the motion comes from.
-    pub(crate) plan: Plan,
+    pub(crate) plan: Plan<'a, R>,
 }
 
 /// Joint torques (N m) of the wrench of the environment at the grasp point. Not inlined, as what asks for them.
@@ -113,6 +120,16 @@ pub(crate) struct Disagreement<R: Real> {
     swings_back: u8,
     /// Control periods for which something has pushed, one with its feedback being [`OBVIOUS`].
     pushing: u8,
+}
+
+impl<R: Real> Effort<'_, R> {
+    /// All the torque that was sent to turn the joints (N m), but for what presses on the environment: in a run with
+    /// friction fed forward, and what the plan accelerates.
+    fn turning(&self) -> Vector7<R> {
+        let Plan::Run { observer, friction } = self.plan else { return self.sent };
+        let all = observer.accelerating() + friction;
+        self.pressing.map_or(all, |pressing| all - pressing)
+    }
 }
 
 impl<R: Real> Disagreement<R> {
@@ -171,7 +188,7 @@ impl<R: Real> Disagreement<R> {
             return false;
         }
         let asked = self.transmission.motor_torques_from_joint(&(*effort.feedback).into());
-        let sent = self.transmission.motor_torques_from_joint(&effort.sent.into());
+        let sent = self.transmission.motor_torques_from_joint(&effort.turning().into());
         let outside = effort.pressing.map_or(*environment, |pressing| environment + pressing);
         let environment = self.transmission.motor_torques_from_joint(&outside.into());
         let speeds = self.transmission.motor_from_joint(&(*effort.desired).into());
@@ -201,14 +218,12 @@ impl<R: Real> Disagreement<R> {
                 at_least(swing, -swing) > limit && at_least(rest, -rest) > limit
             };
             let (asked, sent) = ((asked, anchor.0), (sent, anchor.1));
-            // What the observer believes, and friction that was fed forward, may have made up for what was asked for.
+            // What the observer believes, and what was fed forward, may have made up for what was asked for.
+            let both = || swings(asked.0, asked.1, IN_MOTION) && swings(sent.0, sent.1, IN_MOTION);
             let too_far = match effort.plan {
                 _ if breaks_away => swings(sent.0, sent.1, 1.0),
-                Plan::Run => swings(asked.0, asked.1, 1.0),
-                Plan::Approach => {
-                    swings(asked.0, asked.1, IN_APPROACH) && swings(sent.0, sent.1, IN_APPROACH)
-                        || swings(asked.0, asked.1, UNDENIABLE)
-                }
+                Plan::Run { .. } => both(),
+                Plan::Approach => both() || swings(asked.0, asked.1, UNDENIABLE),
             };
             *beyond = if too_far { beyond.saturating_add(1) } else { 0 };
             stuck |= *still > STILL && *beyond > if breaks_away { LETTING_GO } else { 0 };
@@ -273,11 +288,11 @@ mod tests {
         sent: f64,
         speed: f64,
         breaking_away: u8,
-        plan: Plan,
+        runs: bool,
     }
 
-    const RUN: Asked = Asked { feedback: 0.0, sent: 0.0, speed: 0.3, breaking_away: 0, plan: Plan::Run };
-    const APPROACH: Asked = Asked { plan: Plan::Approach, ..RUN };
+    const RUN: Asked = Asked { feedback: 0.0, sent: 0.0, speed: 0.3, breaking_away: 0, runs: true };
+    const APPROACH: Asked = Asked { runs: false, ..RUN };
     const BREAKING_AWAY: Asked = Asked { speed: 0.0, breaking_away: M4, ..APPROACH };
 
     /// The torque swings by this much of the friction, in what is asked for and in what is sent.
@@ -311,13 +326,15 @@ mod tests {
         let friction = wam7::FRICTION_COULOMB[J4];
         let (feedback, desired) = (at_j4(asked.feedback * friction), at_j4(asked.speed));
         let pressing = at_j4(pressing * friction);
+        let observer = MotionObserver::new();
+        let forward = at_j4(asked.sent * friction) + pressing;
         let effort = Effort {
             feedback: &feedback,
             sent: at_j4(asked.sent * friction),
             pressing: Some(&pressing),
             desired: &desired,
             breaking_away: asked.breaking_away,
-            plan: asked.plan,
+            plan: if asked.runs { Plan::Run { observer: &observer, friction: &forward } } else { Plan::Approach },
         };
         seen.encoder_stands_still(&effort, &at_j4(environment * friction), force, unchanged)
     }
@@ -330,17 +347,24 @@ mod tests {
     }
 
     #[test]
-    fn a_torque_of_a_run_that_swings_by_more_than_three_times_the_friction_finds_a_motor_that_stands() {
+    fn both_torques_of_a_run_have_to_swing_by_three_and_a_half_times_the_friction() {
         for sign in [1.0, -1.0] {
-            let from = Asked { feedback: -sign, ..RUN };
-            assert_eq!(found(&from, &Asked { feedback: 2.1 * sign, ..RUN }), Some(STILL + 1));
-            // To the last bit: friction that is three times that of the model may hold it.
-            assert_eq!(found(&from, &Asked { feedback: 2.0 * sign, ..RUN }), None);
+            let from = Asked { feedback: -sign, sent: -sign, ..RUN };
+            for (feedback, sent, expected) in [
+                (2.6, 2.6, Some(STILL + 1)),
+                // Three times the friction of the model may hold it, with what other joints swing.
+                (2.4, 2.4, None),
+                // What was fed forward makes up for what was asked for, or is not asked for.
+                (9.0, 2.4, None),
+                (2.4, 9.0, None),
+            ] {
+                let then = Asked { feedback: feedback * sign, sent: sent * sign, ..RUN };
+                assert_eq!(found(&from, &then), expected, "{feedback} {sent} {sign}");
+            }
             // A large torque that stays is no swing.
             let steady = Asked { feedback: 9.0 * sign, sent: 9.0 * sign, ..RUN };
             assert_eq!(found(&steady, &steady), None);
         }
-        assert_eq!(found(&RUN, &Asked { sent: 9.0, ..RUN }), None, "what is fed forward is not looked at");
     }
 
     #[test]
@@ -418,14 +442,14 @@ mod tests {
     fn what_the_environment_takes_of_a_torque_and_what_presses_on_it_is_no_friction() {
         // Swing of the feedback, of the environment and of the force control, in parts of the friction.
         for (swing, environment, pressing, is_found) in [
-            (3.1, 0.0, 0.0, true),
-            (3.1, -0.7, 0.0, false),
-            (3.1, 0.7, 0.0, true),
+            (3.6, 0.0, 0.0, true),
+            (3.6, -0.7, 0.0, false),
+            (3.6, 0.7, 0.0, true),
             // Something is met: half as much again, with it and without it.
-            (4.4, 0.8, 0.0, false),
-            (4.6, 0.8, 0.0, true),
-            (5.2, -0.8, 0.0, false),
-            (5.4, -0.8, 0.0, true),
+            (5.2, 0.8, 0.0, false),
+            (5.3, 0.8, 0.0, true),
+            (6.0, -0.8, 0.0, false),
+            (6.1, -0.8, 0.0, true),
             (9.0, -5.0, 0.0, false),
             (9.0, 0.0, -5.0, false),
             (9.0, -5.0, 5.0, true),

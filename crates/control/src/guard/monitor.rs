@@ -194,6 +194,7 @@ mod tests {
     use crate::guard::disagreement::Plan;
     use crate::model::arm::ArmModel;
     use crate::model::calibration::{Calibration, Payload};
+    use crate::sense::observer::MotionObserver;
     use crate::units::{JointPositions, JointVelocities};
 
     const POSTURE: [f64; JOINTS] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
@@ -263,13 +264,14 @@ mod tests {
         /// The finding of one more cycle.
         fn check(&mut self, law: State) -> (Trigger, Fault) {
             let frames = Frames::new(&self.model, &self.state.q);
+            let observer = MotionObserver::new();
             let effort = self.effort.as_ref().map(|(feedback, desired)| Effort {
                 feedback,
                 pressing: Some(&self.pressing),
                 sent: self.sent.unwrap_or(*feedback),
                 desired,
                 breaking_away: 0,
-                plan: Plan::Run,
+                plan: Plan::Run { observer: &observer, friction: feedback },
             });
             let seen = Observation {
                 frames: &frames,

@@ -1,5 +1,6 @@
 //! From the replies of the bus to what is known: joints, wrench, hand, and how they deviate from what is expected.
 
+mod correction;
 pub mod deviation;
 pub mod drift;
 pub mod filter;

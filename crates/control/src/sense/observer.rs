@@ -11,6 +11,7 @@ use nalgebra::SMatrix;
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
 use crate::real::{Real, at_least, within};
+use crate::sense::correction::Correction;
 use crate::sense::joints::JointState;
 use crate::sense::swing::Swings;
 use crate::time::{PERIOD, RATE, few_periods};
@@ -69,34 +70,6 @@ impl Trust {
     /// That of a run.
     pub fn of_run(compliant: bool) -> Self {
         if compliant { Trust::Compliant } else { Trust::Stiff }
-    }
-}
-
-/// Gains of the correction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Correction<R: Real> {
-    position: Vector7<R>,
-    velocity: Vector7<R>,
-    acceleration: Vector7<R>,
-}
-
-impl<R: Real> Correction<R> {
-    /// Two poles at `motion` and one at `disturbance` (Hz), joint by joint.
-    fn with_poles(motion: &[f64; JOINTS], disturbance: f64) -> Self {
-        let away = |frequency: f64| 1.0 - libm::exp(-core::f64::consts::TAU * frequency * PERIOD);
-        let slow = away(disturbance);
-        let mut correction =
-            Correction { position: Vector7::zeros(), velocity: Vector7::zeros(), acceleration: Vector7::zeros() };
-        for (joint, motion) in motion.iter().enumerate() {
-            let fast = away(*motion);
-            let third = fast * fast * slow;
-            let second = fast * fast + 2.0 * fast * slow - 1.5 * third;
-            let first = 2.0 * fast + slow - second - 0.5 * third;
-            correction.position[joint] = R::constant(first);
-            correction.velocity[joint] = R::constant(second / PERIOD);
-            correction.acceleration[joint] = R::constant(third / (PERIOD * PERIOD));
-        }
-        correction
     }
 }
 
@@ -183,6 +156,13 @@ impl<R: Real> MotionObserver<R> {
             *velocity += within(*observed - *velocity, farthest);
         }
         velocity
+    }
+
+    /// Torque (N m) that accelerates the joints, as the model has it of what was sent last: it leaves out gravity, the
+    /// torques of motion, and friction that was fed forward.
+    #[inline(never)]
+    pub fn accelerating(&self) -> Vector7<R> {
+        self.mass * self.sent[0]
     }
 
     /// Positions (rad), kept near the measured ones.

@@ -291,3 +291,29 @@ fn g8_a_force_that_was_measured_before_the_sensor_fell_silent_stops_nothing() {
     rig.run_for(0.5);
     assert_eq!(rig.cycle.state(), State::Hold, "{:?}", rig.cycle.fault());
 }
+
+/// Near the axis of the shoulder J1 and J3 turn far for a little way of the hand, and turn round where the plan does
+/// not: friction that is fed forward swings against the feedback, and a motor that sticks there is sound.
+///
+/// The change that makes it fail: the feedback of a run is judged alone.
+#[test]
+fn a8_no_sound_encoder_is_called_stuck_in_a_run_near_the_axis_of_the_shoulder() {
+    let bent = [
+        ([-0.28, 0.44, -0.08, 1.59, 0.47, 0.60, 0.08], [-0.45, 0.14, 0.10, 1.64, 0.06, 0.46, 0.28], 1.688, 1.3),
+        ([-0.12, 0.13, 0.03, 1.63, 0.22, -0.45, -0.02], [-0.41, -0.04, 0.32, 1.58, 0.26, -0.80, -0.37], 1.493, 1.3),
+        ([0.17, 0.16, 0.00, 2.16, 0.40, -0.52, 0.25], [0.12, -0.22, 0.33, 2.29, 0.58, -0.83, 0.34], 1.514, 1.0),
+    ];
+    let straight =
+        ([-0.38, 0.08, 0.30, 1.26, -0.05, 0.07, 0.20], [-0.68, -0.13, 0.19, 1.66, 0.24, 0.12, 0.59], 1.913, 1.3);
+    let runs = bent.map(|run| (run, true)).into_iter().chain([(straight, false)]);
+    for (number, ((start, goal, duration, friction), bent)) in runs.enumerate() {
+        let mut rig = Rig::<f32>::new(start, 1);
+        rig.plant.coulomb *= friction;
+        rig.load(&primitive(&Design { start, goal, duration, bent, ..Design::default() })).expect("loads");
+        rig.command(Command::Hold);
+        rig.run_for(1.5);
+        rig.command(Command::Run(RunOptions::default()));
+        rig.until(State::Hold, 6.0);
+        assert_eq!(rig.cycle.fault(), Fault::None, "run {number}");
+    }
+}
