@@ -31,6 +31,7 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::command::Command", "once, when a person commands"),
     ("control::plan::run::", "once, when a run begins; while its goal changes"),
     ("control::plan::goal", "while the goal of a run changes"),
+    ("control::cycle::laws::crowd", "while the goal of a run changes"),
     ("control::cycle::laws::speed_load", "while the goal of a run changes"),
     ("control::plan::approach", "once, when an approach begins"),
     ("control::model::arm::ArmModel", "when a payload is found"),

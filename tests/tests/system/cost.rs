@@ -48,6 +48,9 @@ fn all_on(compliant: bool) -> RunOptions {
     RunOptions { feedback: compliant, force_control: true, compliant, ..RunOptions::default() }
 }
 
+/// Time within which a joint comes to its limit: 30 s, in control cycles.
+const LONG: u32 = 30 * RATE_HZ;
+
 /// Costs by what happened.
 struct Costs {
     arm: Arm,
@@ -103,6 +106,17 @@ impl Costs {
         self.cycles("run", RATE_HZ / 10);
     }
 
+    /// Goes on until a joint has been at its limit for all the phases of the observer.
+    fn at_a_limit(&mut self) {
+        for _ in 0..RENEWAL {
+            let mut left = LONG;
+            while self.cycle("run at a limit").flags & control::flags::CLAMPED == 0 {
+                left -= 1;
+                assert!(left > 0, "no joint comes to its limit within {LONG} cycles");
+            }
+        }
+    }
+
     fn state(&mut self) -> Option<State> {
         State::from_code(self.cycle("state").state)
     }
@@ -146,6 +160,18 @@ fn no_order_and_no_stop_makes_a_control_cycle_longer_than_29_900_instructions() 
         simulation(costs.arm.transport()).world().push([0.0; 3], [0.0; 3]);
         assert_eq!(costs.state(), Some(State::SoftStop), "a push of 80 N stops a run");
         costs.clear();
+        costs.go_to_the_start();
+    }
+    for compliant in [true, false] {
+        costs.begin(compliant);
+        // Up and aside, where J6 comes to its limit on the way.
+        let aside = |y: f32| Goal { position: Some([0.3, y, 0.3]), orientation: None };
+        costs.order("goal moved", |arm| expect(arm.set_goal(aside(0.6))));
+        costs.at_a_limit();
+        costs.order("goal moved at a limit", |arm| expect(arm.set_goal(aside(0.59))));
+        costs.at_a_limit();
+        costs.order("speed changed at a limit", |arm| expect(arm.set_speed(0.9)));
+        costs.order("run held", |arm| expect(arm.hold()));
         costs.go_to_the_start();
     }
     for compliant in [true, false] {

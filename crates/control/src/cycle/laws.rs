@@ -12,9 +12,9 @@ use crate::model::wam7;
 use crate::plan::hand::Grasp;
 use crate::plan::primitive::posture_and_hand;
 use crate::plan::reference::{HandReference, JointReference, TaskReference};
-use crate::plan::run::Senses;
+use crate::plan::run::{Run, Senses};
 use crate::real::{Real, at_least, at_most, sqrt};
-use crate::sense::observer::Trust;
+use crate::sense::observer::{MotionObserver, Trust};
 use crate::time::{PERIOD, few_periods, periods};
 use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6, Vector7, Wrench};
 
@@ -279,9 +279,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let how = (PoseFeedback::of_run(options.compliant), options.acceleration);
         let reference = operational.step(&self.model, tracking, measured.frames, measured.state, &task, how);
         if run.goal_moves() {
-            // A goal that the joints cannot follow is not led away from the tool.
-            let behind = lag.distance * R::constant(1.0 / TRACKING_LIMIT);
-            run.crowd(at_least(speed_load(measured.frames, &reference.dq), behind));
+            crowd(run, &self.observer, measured.frames, &reference.dq, lag);
         }
         let velocity = self.observer.velocity(measured.state, Trust::of_run(options.compliant), &reference.dq.0);
         let mut torque =
@@ -327,6 +325,22 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         leaning.act(&mut torque, &measured.state.dq, &reference.dq);
         *lag = Lag::new(&(task.pose.position - measured.pose.position), operational.lag());
         Demand { torque, q_d: reference.q, pose_d: task.pose, phase: plan.phase, surprise, flags: set, explained }
+    }
+}
+
+/// A goal that the joints cannot follow is not led away from the tool. A cycle later will do where this one renews the
+/// mass matrix.
+#[inline(never)]
+fn crowd<R: Real, const N: usize>(
+    run: &mut Run<R, N>,
+    observer: &MotionObserver<R>,
+    frames: &Frames<R>,
+    dq: &JointVelocities<R>,
+    lag: &Lag<R>,
+) {
+    if !observer.is_renewing() {
+        let behind = lag.distance * R::constant(1.0 / TRACKING_LIMIT);
+        run.crowd(at_least(speed_load(frames, dq), behind));
     }
 }
 

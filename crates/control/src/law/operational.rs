@@ -212,7 +212,14 @@ impl<R: Real> OperationalController<R> {
         let share = R::constant(PERIOD / LIMIT_TIME);
         let limits = model.soft_min.iter().zip(&model.soft_max);
         let joints = q_d.iter_mut().zip(self.dq_d.0.iter_mut()).zip(self.q_d.0.iter());
+        let mut near = self.near;
         for (((desired, rate), before), (min, max)) in joints.zip(limits) {
+            let is_near = near & 1 != 0;
+            near >>= 1;
+            if !is_near {
+                // It is too far away to come there in this tick, and every instruction counts.
+                continue;
+            }
             let (down, up) = ((*min - *before) * share, (*max - *before) * share);
             let kept = at_most(at_least(*desired, *before + down), *before + up);
             if kept != *desired {

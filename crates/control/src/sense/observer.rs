@@ -217,6 +217,11 @@ impl<R: Real> MotionObserver<R> {
         self.sent = [if known { next } else { Vector7::zeros() }, self.sent[0]];
     }
 
+    /// True if this control period renews the mass matrix or its factor: what can wait for the next one does.
+    pub fn is_renewing(&self) -> bool {
+        self.cycle <= 1
+    }
+
     /// This control period has a change of state to compute: a renewal of the mass matrix that is due waits for the
     /// next one. Without this the longest cycle of a run depends on the moment at which a person begins it.
     pub fn postpone(&mut self) {
