@@ -83,9 +83,10 @@ const ELSEWHERE: &[(&str, &str)] = &[
         "control::law::operational::OperationalController<R>::release",
         "the memory is full; something has drawn a spring: seven joints, a few dozen instructions each",
     ),
+    ("control::law::soft_limits", "the plan is near a soft limit: seven joints, a dozen instructions each"),
     (
-        "control::law::operational::OperationalController<R>::come_to_limits",
-        "the plan is near a soft limit: seven joints, a dozen instructions each",
+        "control::model::redundancy",
+        "the plan is at a soft limit: a few hundred instructions, in cycles that do not renew the mass matrix",
     ),
     ("control::law::joint::JointController<R>::keep", "a reply is missing: a few dozen instructions"),
     ("control::sense::swing", "the memory is full; seven joints, a few dozen instructions each"),

@@ -14,7 +14,8 @@ use crate::plan::primitive::posture_and_hand;
 use crate::plan::reference::{HandReference, JointReference, TaskReference};
 use crate::plan::run::{Run, Senses};
 use crate::real::{Real, at_least, at_most, sqrt};
-use crate::sense::observer::{MotionObserver, Trust};
+use crate::sense::leisure::Leisure;
+use crate::sense::observer::Trust;
 use crate::time::{PERIOD, few_periods, periods};
 use crate::units::{JointPositions, JointTorques, JointVelocities, Pose, Vector6, Vector7, Wrench};
 
@@ -276,10 +277,12 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let task = TaskReference::from_plan(&plan);
         let grips = options.compliant && grasp == Grasp::Gripping;
         operational.keep(lift.step(&task, grips, deviation.as_ref()));
-        let how = (PoseFeedback::of_run(options.compliant), options.acceleration);
+        let leisure = self.observer.leaves();
+        self.soft_limits.renew(leisure == Leisure::Limits);
+        let how = (PoseFeedback::of_run(options.compliant), options.acceleration, &mut self.soft_limits);
         let reference = operational.step(&self.model, tracking, measured.frames, measured.state, &task, how);
-        if run.goal_moves() {
-            crowd(run, &self.observer, measured.frames, &reference.dq, lag);
+        if leisure == Leisure::Goal && run.goal_moves() {
+            crowd(run, measured.frames, &reference.dq, lag);
         }
         let velocity = self.observer.velocity(measured.state, Trust::of_run(options.compliant), &reference.dq.0);
         let mut torque =
@@ -328,20 +331,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     }
 }
 
-/// A goal that the joints cannot follow is not led away from the tool. A cycle later will do where this one renews the
-/// mass matrix.
+/// A goal that the joints cannot follow is not led away from the tool.
 #[inline(never)]
-fn crowd<R: Real, const N: usize>(
-    run: &mut Run<R, N>,
-    observer: &MotionObserver<R>,
-    frames: &Frames<R>,
-    dq: &JointVelocities<R>,
-    lag: &Lag<R>,
-) {
-    if !observer.is_renewing() {
-        let behind = lag.distance * R::constant(1.0 / TRACKING_LIMIT);
-        run.crowd(at_least(speed_load(frames, dq), behind));
-    }
+fn crowd<R: Real, const N: usize>(run: &mut Run<R, N>, frames: &Frames<R>, dq: &JointVelocities<R>, lag: &Lag<R>) {
+    let behind = lag.distance * R::constant(1.0 / TRACKING_LIMIT);
+    run.crowd(at_least(speed_load(frames, dq), behind));
 }
 
 /// Part of the speed limits that these joint speeds use, at most one of them in full: of the joints, of elbow and

@@ -29,6 +29,7 @@ use crate::guard::monitor::{Monitor, Observation};
 use crate::guard::supervisor::{State, Supervisor, Trigger};
 use crate::law::force::ForceController;
 use crate::law::gains::Gains;
+use crate::law::soft_limits::SoftLimits;
 use crate::model::arm::ArmModel;
 use crate::model::calibration::{Calibration, Payload};
 use crate::model::kinematics::Frames;
@@ -83,6 +84,7 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     wrench: WrenchEstimator<R>,
     limiter: TorqueLimiter<R>,
     bounds: JointBounds<R>,
+    soft_limits: SoftLimits<R>,
     law: Law<R>,
     /// Place of the run that [`Law::Run`] carries out; in every other state what is left of the last one.
     run: Option<Run<R, N>>,
@@ -134,6 +136,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let home = JointPositions::zero();
         init!(Cycle {
             bounds: JointBounds::around(&model, &home),
+            soft_limits: SoftLimits::new(),
             supervisor: Supervisor::new(),
             monitor: Monitor::new(calibration.transmission),
             joints: JointEstimator::new(&calibration),

@@ -111,6 +111,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             (Law::Posture(posture), Some(q)) if !options.compliant => JointPositions(q.0 + posture.integral.shift()),
             _ => measured.state.q,
         };
+        self.soft_limits.restart();
         self.force.restart(self.gains.tracking(options.compliant).force_window);
         // What a limit has cut off is not to be taken over: after arming that is the gravity which has yet to build up.
         let (handover, leaning) = if options.compliant && held.is_some() && !self.cut.is_cut() {

@@ -26,6 +26,10 @@ const LETTING_GO: u8 = few_periods(0.025);
 /// limits, and what the model does not know of the dynamics swings with them.
 const IN_MOTION: f64 = 3.5 / SWING;
 
+/// Torque that friction does not take, in parts of [`SWING`]: other joints that speed up or slow down turn one as well,
+/// those of a stretched arm by more than its friction.
+const RESISTED: f64 = 1.2 / SWING;
+
 /// Swing of the torque that measured motion asks for in an approach, beyond which the one that was sent is not looked
 /// at, in parts of [`SWING`]: a motor that runs away unseen is damped by what the observer believes, and time presses.
 const UNDENIABLE: f64 = 4.0 / SWING;
@@ -53,6 +57,9 @@ const PUSH: f64 = 3.5;
 /// The same of J1 to J4 beside a sensor (N m), once what it measures is taken off: elbow and forearm meet something.
 /// Friction, a kilogram at the hand that the tare took away, and masses that differ by a tenth stay below.
 const UNSEEN: [f64; 4] = [7.5, 14.0, 11.0, 7.0];
+
+/// Part of that torque which turns no joint where one meets something.
+const MET: f64 = 0.5;
 
 /// Measured force (N) of which the joints have to know.
 const TOLD: f64 = 5.0;
@@ -123,12 +130,23 @@ pub(crate) struct Disagreement<R: Real> {
 }
 
 impl<R: Real> Effort<'_, R> {
-    /// All the torque that was sent to turn the joints (N m), but for what presses on the environment: in a run with
-    /// friction fed forward, and what the plan accelerates.
-    fn turning(&self) -> Vector7<R> {
-        let Plan::Run { observer, friction } = self.plan else { return self.sent };
-        let all = observer.accelerating() + friction;
-        self.pressing.map_or(all, |pressing| all - pressing)
+    /// The part of what was sent (N m) that turns no joint, as the measured motion of all of them tells it.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn resisted(&self) -> Vector7<R> {
+        match self.plan {
+            Plan::Run { observer, friction } => friction - observer.unknown(),
+            Plan::Approach => self.sent,
+        }
+    }
+
+    /// True if the torque of a motor that turns no joint is more than friction takes; `limit` is the swing of friction
+    /// (N m).
+    #[cold]
+    #[inline(never)]
+    fn is_resisted(&self, transmission: &Transmission<R>, motor: usize, limit: R) -> bool {
+        let torques = transmission.motor_torques_from_joint(&self.resisted().into());
+        torques.get(motor).is_some_and(|torque| at_least(*torque, -*torque) > limit * R::constant(RESISTED))
     }
 }
 
@@ -188,7 +206,7 @@ impl<R: Real> Disagreement<R> {
             return false;
         }
         let asked = self.transmission.motor_torques_from_joint(&(*effort.feedback).into());
-        let sent = self.transmission.motor_torques_from_joint(&effort.turning().into());
+        let sent = self.transmission.motor_torques_from_joint(&effort.sent.into());
         let outside = effort.pressing.map_or(*environment, |pressing| environment + pressing);
         let environment = self.transmission.motor_torques_from_joint(&outside.into());
         let speeds = self.transmission.motor_from_joint(&(*effort.desired).into());
@@ -222,7 +240,9 @@ impl<R: Real> Disagreement<R> {
             let both = || swings(asked.0, asked.1, IN_MOTION) && swings(sent.0, sent.1, IN_MOTION);
             let too_far = match effort.plan {
                 _ if breaks_away => swings(sent.0, sent.1, 1.0),
-                Plan::Run { .. } => both(),
+                Plan::Run { .. } => {
+                    swings(asked.0, asked.1, IN_MOTION) && effort.is_resisted(&self.transmission, motor, limit)
+                }
                 Plan::Approach => both() || swings(asked.0, asked.1, UNDENIABLE),
             };
             *beyond = if too_far { beyond.saturating_add(1) } else { 0 };
@@ -239,13 +259,16 @@ impl<R: Real> Disagreement<R> {
         self.goes_on(if pushes { OBVIOUS } else { 0 })
     }
 
-    /// The same beside a sensor: `unexplained` is what was sent against friction, less what the sensor explains of it
-    /// (N m). True as well if the sensor has told for 0.2 s of a push that the joints do not know of.
+    /// The same beside a sensor: `sent` is what was sent against friction, and `resisted` the part of it that turns no
+    /// joint, both less what the sensor explains (N m). True as well if the sensor has told for 0.2 s of a push that
+    /// the joints do not know of.
     ///
     /// Not inlined: it is asked where [`is_large`] says so.
     #[inline(never)]
-    pub(crate) fn is_contradicted(&mut self, feedback: &Vector7<R>, unexplained: &Vector7<R>) -> bool {
-        self.goes_on(match (exceeds(unexplained, UNSEEN), exceeds(feedback, UNSEEN)) {
+    pub(crate) fn is_contradicted(&mut self, feedback: &Vector7<R>, [sent, resisted]: [Vector7<R>; 2]) -> bool {
+        self.goes_on(match (exceeds(&sent, UNSEEN), exceeds(feedback, UNSEEN)) {
+            // A joint that is turned round is no joint that is pushed.
+            (true, true) if !exceeds(&resisted, UNSEEN.map(|torque| MET * torque)) => 0,
             (true, true) => OBVIOUS,
             (true, false) => 1,
             (false, _) => 0,
@@ -490,7 +513,7 @@ mod tests {
         };
         let found = |feedback: Vector7<f64>, rest: Vector7<f64>| {
             let mut seen = new();
-            (1..=2 * CONTRADICTING).find(|_| seen.is_contradicted(&feedback, &rest))
+            (1..=2 * CONTRADICTING).find(|_| seen.is_contradicted(&feedback, [rest; 2]))
         };
         for (joint, bar) in UNSEEN.into_iter().enumerate() {
             for sign in [1.0, -1.0] {

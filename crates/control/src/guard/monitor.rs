@@ -163,7 +163,7 @@ impl<R: Real> Monitor<R> {
                 let pushed = if seen.blind {
                     self.disagreement.is_pushed(effort.feedback)
                 } else if follows_plan && seen.carried && disagreement::is_large(effort.feedback, told) {
-                    self.disagreement.is_contradicted(effort.feedback, &unexplained(effort, seen))
+                    self.disagreement.is_contradicted(effort.feedback, unexplained(effort, seen))
                 } else {
                     self.disagreement.forget_pushes();
                     false
@@ -179,13 +179,14 @@ impl<R: Real> Monitor<R> {
     }
 }
 
-/// Torque that was sent against friction, less what the sensor explains of it (N m). A joint that is slowed down is no
-/// joint that is pushed: measured motion alone asks for more than is sent. Not inlined: it is asked where the feedback
-/// is that of a push.
+/// Torque that was sent against friction, and the part that turns no joint, each less what the sensor explains of it
+/// (N m). A joint that is slowed down is no joint that is pushed: measured motion alone asks for more than is sent. Not
+/// inlined: it is asked where the feedback is that of a push.
 #[inline(never)]
-fn unexplained<R: Real>(effort: &Effort<'_, R>, seen: &Observation<'_, R>) -> Vector7<R> {
+fn unexplained<R: Real>(effort: &Effort<'_, R>, seen: &Observation<'_, R>) -> [Vector7<R>; 2] {
     let environment = disagreement::torques_of(seen.wrench, seen.frames);
-    effort.sent + effort.pressing.map_or(environment, |pressing| environment + pressing)
+    let explained = effort.pressing.map_or(environment, |pressing| environment + pressing);
+    [effort.sent + explained, effort.resisted() + explained]
 }
 
 #[cfg(test)]

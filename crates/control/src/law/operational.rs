@@ -13,6 +13,7 @@ use nalgebra::Vector3;
 
 use crate::command::AccelerationSource;
 use crate::law::gains::{HELD_BY_FRICTION, Tracking};
+use crate::law::soft_limits::SoftLimits;
 use crate::law::spring::{self, LET_GO};
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
@@ -29,13 +30,6 @@ const ACCELERATION_CUT_OFF: f64 = 15.0;
 /// Fastest return to the plan, added to the speed of the plan itself (m/s, rad/s): an arm that was pushed far off does
 /// not snap back.
 const CORRECTION_SPEED: (f64, f64) = (0.2, 1.0);
-
-/// Time constant with which `q_d` comes to a soft limit (s). Stopped at once, a compliant joint swings past it: J2 that
-/// came with 0.26 rad/s by 0.02 rad, which stops the arm.
-const LIMIT_TIME: f64 = 0.15;
-
-/// Distance of `q_d` from a soft limit within which it comes to it slowly, if it does (rad): a plan of 2 rad/s does.
-const NEAR_LIMIT: f64 = 0.35;
 
 /// Distance of `q_d` from which on a spring is drawn (rad), which nothing but a push or an obstacle does, and below
 /// which it no longer is.
@@ -69,9 +63,6 @@ pub struct OperationalController<R: Real> {
     drawn: u8,
     /// The joint whose turn it is to be looked at.
     turn: u8,
-    /// Joints whose `q_d` is near a soft limit, one bit each, J1 lowest, and the one whose turn it is to be looked at.
-    near: u8,
-    looked_at: u8,
     lag: R,
     /// The planned posture goes nowhere by itself.
     keeps: bool,
@@ -87,8 +78,6 @@ impl<R: Real> OperationalController<R> {
             clamped: false,
             drawn: 0,
             turn: 0,
-            near: 0,
-            looked_at: 0,
             lag: R::constant(0.0),
             keeps: false,
         }
@@ -128,7 +117,7 @@ impl<R: Real> OperationalController<R> {
         frames: &Frames<R>,
         state: &JointState<R>,
         task: &TaskReference<R>,
-        (feedback, acceleration): (PoseFeedback, AccelerationSource),
+        (feedback, acceleration, limits): (PoseFeedback, AccelerationSource, &mut SoftLimits<R>),
     ) -> JointReference<R> {
         let planned;
         let frames = match feedback {
@@ -157,10 +146,10 @@ impl<R: Real> OperationalController<R> {
             PoseFeedback::Planned => &self.q_d.0,
         };
         let preferred = (task.posture - posture) * if self.keeps { R::constant(0.0) } else { gains.posture };
-        let dq_d = inverse.resolve(&(task.velocity + correction), &preferred);
+        let mut dq_d = inverse.resolve(&(task.velocity + correction), &preferred);
 
         // Without what corrects the pose: feedback through the sign of the friction would have a large gain.
-        let planned = inverse.resolve(&task.velocity, &task.posture_velocity);
+        let mut planned = inverse.resolve(&task.velocity, &task.posture_velocity);
 
         let dq = match feedback {
             PoseFeedback::Measured => &state.dq,
@@ -169,7 +158,7 @@ impl<R: Real> OperationalController<R> {
         let rate = task.velocity - jacobian.twist(&dq.0);
         self.lag = sqrt(rate.fixed_rows::<3>(0).norm_squared());
         let damps = R::constant(if feedback == PoseFeedback::Measured { 0.0 } else { 1.0 });
-        let ddq_d = match acceleration {
+        let mut ddq_d = match acceleration {
             AccelerationSource::Analytic => {
                 let damping = gain(rate.fixed_rows::<3>(0).into(), rate.fixed_rows::<3>(3).into()) * damps;
                 let wanted = task.acceleration + damping - frames.velocity_product(dq).to_vector();
@@ -178,13 +167,13 @@ impl<R: Real> OperationalController<R> {
             AccelerationSource::Differentiated => self.derivative.step(&((dq_d - self.dq_d.0) * R::constant(RATE))),
         };
 
-        self.dq_d = JointVelocities(dq_d);
-        self.clamped = false;
         let mut q_d = self.q_d.0 + dq_d * R::constant(PERIOD);
-        self.look_at_a_limit(model, &q_d);
-        if self.near != 0 {
-            self.come_to_limits(model, &mut q_d);
+        self.clamped = false;
+        if limits.look(model, &q_d, &dq_d) {
+            self.clamped = limits.come(model, &inverse, &self.q_d.0, (&mut dq_d, &mut planned), &mut ddq_d);
+            q_d = self.q_d.0 + dq_d * R::constant(PERIOD);
         }
+        self.dq_d = JointVelocities(dq_d);
         for ((desired, measured), clamp) in q_d.iter_mut().zip(state.q.0.iter()).zip(gains.clamp.iter()) {
             let kept = at_most(at_least(*desired, *measured - *clamp), *measured + *clamp);
             self.clamped |= kept != *desired;
@@ -192,41 +181,6 @@ impl<R: Real> OperationalController<R> {
         }
         self.q_d = JointPositions(q_d);
         JointReference { q: self.q_d, dq: self.dq_d, ddq: JointAccelerations(ddq_d), planned: JointVelocities(planned) }
-    }
-
-    /// Notes whether a joint of this posture is near a soft limit: one in a tick, because none comes there faster.
-    fn look_at_a_limit(&mut self, model: &ArmModel<R>, q_d: &Vector7<R>) {
-        let joint = usize::from(self.looked_at) % JOINTS;
-        self.looked_at = joint as u8 + 1;
-        let near = R::constant(NEAR_LIMIT);
-        let (q, bit) = (q_d[joint], 1 << joint);
-        let is_near = q < model.soft_min[joint] + near || q > model.soft_max[joint] - near;
-        self.near = if is_near { self.near | bit } else { self.near & !bit };
-    }
-
-    /// Feedback beyond a soft limit is not wanted of a joint: the arm gives way as far as it can, and does not stop.
-    ///
-    /// Not inlined: it is asked near a limit.
-    #[inline(never)]
-    fn come_to_limits(&mut self, model: &ArmModel<R>, q_d: &mut Vector7<R>) {
-        let share = R::constant(PERIOD / LIMIT_TIME);
-        let limits = model.soft_min.iter().zip(&model.soft_max);
-        let joints = q_d.iter_mut().zip(self.dq_d.0.iter_mut()).zip(self.q_d.0.iter());
-        let mut near = self.near;
-        for (((desired, rate), before), (min, max)) in joints.zip(limits) {
-            let is_near = near & 1 != 0;
-            near >>= 1;
-            if !is_near {
-                // It is too far away to come there in this tick, and every instruction counts.
-                continue;
-            }
-            let (down, up) = ((*min - *before) * share, (*max - *before) * share);
-            let kept = at_most(at_least(*desired, *before + down), *before + up);
-            if kept != *desired {
-                (*desired, *rate) = (kept, (kept - *before) * R::constant(RATE));
-                self.clamped = true;
-            }
-        }
     }
 
     /// Lets go, from the next tick on, of the springs between joints and `q_d` that something has drawn and whose
@@ -298,9 +252,16 @@ mod tests {
         };
         let state = JointState::whole(held, JointVelocities::zero());
         let (frames, gains) = (Frames::new(&model, &held), Gains::tuned().compliant);
-        let mut controller = OperationalController::new(posture);
+        let (mut controller, mut limits) = (OperationalController::new(posture), SoftLimits::new());
         for _ in 0..3000 {
-            controller.step(&model, &gains, &frames, &state, &task, (feedback, AccelerationSource::Analytic));
+            controller.step(
+                &model,
+                &gains,
+                &frames,
+                &state,
+                &task,
+                (feedback, AccelerationSource::Analytic, &mut limits),
+            );
         }
         (controller.q_d().0 - posture.0).amax()
     }
@@ -337,10 +298,10 @@ mod tests {
         let state = JointState::whole(posture, JointVelocities::zero());
         let gains = Gains::tuned().compliant;
         let moved = |keeps| {
-            let mut controller = OperationalController::new(posture);
+            let (mut controller, mut limits) = (OperationalController::new(posture), SoftLimits::new());
             controller.keep(keeps);
             for _ in 0..900 {
-                let how = (PoseFeedback::Planned, AccelerationSource::Analytic);
+                let how = (PoseFeedback::Planned, AccelerationSource::Analytic, &mut limits);
                 controller.step(&model, &gains, &frames, &state, &task, how);
             }
             (controller.q_d().0 - posture.0).amax()

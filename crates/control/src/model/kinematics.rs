@@ -109,7 +109,7 @@ impl<R: Real> Factor<R> {
 
 /// The damped pseudo-inverse of one Jacobian, factorised once and used for velocity and acceleration.
 pub struct DampedInverse<'a, R: Real> {
-    jacobian: &'a Jacobian<R>,
+    pub(super) jacobian: &'a Jacobian<R>,
     factor: Factor<R>,
 }
 

@@ -6,6 +6,7 @@ pub mod drift;
 pub mod filter;
 pub mod hand;
 pub mod joints;
+pub mod leisure;
 pub mod observer;
 pub mod sample;
 pub mod swing;

@@ -13,6 +13,7 @@ use crate::model::kinematics::Frames;
 use crate::real::{Real, at_least, within};
 use crate::sense::correction::Correction;
 use crate::sense::joints::JointState;
+use crate::sense::leisure::Leisure;
 use crate::sense::swing::Swings;
 use crate::time::{PERIOD, RATE, few_periods};
 use crate::units::{JOINTS, JointPositions, Vector7};
@@ -158,11 +159,10 @@ impl<R: Real> MotionObserver<R> {
         velocity
     }
 
-    /// Torque (N m) that accelerates the joints, as the model has it of what was sent last: it leaves out gravity, the
-    /// torques of motion, and friction that was fed forward.
+    /// Torque (N m) of what the model does not know, friction mostly, as the measured motion tells it.
     #[inline(never)]
-    pub fn accelerating(&self) -> Vector7<R> {
-        self.mass * self.sent[0]
+    pub fn unknown(&self) -> Vector7<R> {
+        self.mass * self.disturbance
     }
 
     /// Positions (rad), kept near the measured ones.
@@ -217,9 +217,13 @@ impl<R: Real> MotionObserver<R> {
         self.sent = [if known { next } else { Vector7::zeros() }, self.sent[0]];
     }
 
-    /// True if this control period renews the mass matrix or its factor: what can wait for the next one does.
-    pub fn is_renewing(&self) -> bool {
-        self.cycle <= 1
+    /// The work for which this control period leaves time.
+    pub fn leaves(&self) -> Leisure {
+        match self.cycle {
+            0 | 1 => Leisure::None,
+            even if even % 2 == 0 => Leisure::Limits,
+            _ => Leisure::Goal,
+        }
     }
 
     /// This control period has a change of state to compute: a renewal of the mass matrix that is due waits for the

@@ -7,20 +7,30 @@ use control::units::{JointPositions, JointVelocities};
 use control::{Event, Fault, Goal, PERIOD, Payload, State, flags};
 use nalgebra::Vector3;
 
-use crate::primitives::{Design, GOAL, START, primitive};
+use crate::primitives::{Design, GOAL, START, adapting, primitive};
 use crate::rig::Rig;
 
 /// Repeatable numbers from 0 to 1.
-struct Dice(u64);
+pub(crate) struct Dice(u64);
 
 impl Dice {
-    fn roll(&mut self) -> f64 {
+    /// Those of a seed.
+    pub(crate) fn new(seed: u64) -> Self {
+        let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
+        // The first ones of neighbouring seeds are alike.
+        for _ in 0..10 {
+            dice.roll();
+        }
+        dice
+    }
+
+    pub(crate) fn roll(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// A place in a ball.
-    fn place(&mut self, radius: f64) -> Vector3<f64> {
+    pub(crate) fn place(&mut self, radius: f64) -> Vector3<f64> {
         loop {
             let place = Vector3::from_fn(|_, _| 2.0 * self.roll() - 1.0);
             if place.norm() <= 1.0 {
@@ -70,7 +80,7 @@ impl Worst {
     }
 }
 
-fn model() -> ArmModel<f64> {
+pub(crate) fn model() -> ArmModel<f64> {
     ArmModel::new(Payload::SensorAndHand)
 }
 
@@ -79,7 +89,7 @@ fn stored() -> Vector3<f64> {
     Frames::new(&model(), &JointPositions::from_array(GOAL)).tool_pose().position
 }
 
-fn goal(place: Vector3<f64>) -> Goal {
+pub(crate) fn goal(place: Vector3<f64>) -> Goal {
     Goal { position: Some([0, 1, 2].map(|axis| place[axis] as f32)), ..Goal::STORED }
 }
 
@@ -260,4 +270,74 @@ fn g9_the_flag_of_the_feedback_tells_whether_it_bends_the_plan() {
     println!("{told:?} {bent:?}");
     assert_eq!(told, [true, false]);
     assert!(bent[0] > 5e-3 && bent[1] < 2e-3, "{bent:?}");
+}
+
+/// A joint that comes to its soft limit on the way to a new goal stops no run, and the others make up for it: the tool
+/// stays on its plan as long as they can.
+///
+/// The change that makes it fail: nothing is added to the others (`TrackingError`); the limit is not part of the
+/// acceleration, or friction is fed forward as if the joint went on (`JointLimit`); a motor that other joints hold is
+/// one that friction holds (`EncoderStuck`, the last case: the arm is stretched, which nothing makes up for).
+#[test]
+fn g9_a_goal_that_leads_a_joint_to_its_limit_stops_no_run() {
+    // Start, goal, seconds, moment of the change in them, the new goal (m), and friction in parts of the model's.
+    let cases = [
+        (
+            [-0.57, 1.56, -0.46, 1.34, -0.01, 0.45, 0.46],
+            [-0.95, 1.85, -0.21, 1.17, 0.24, 0.35, 0.54],
+            (2.5, 1.1),
+            [0.19, -0.41, -0.85],
+            1.0,
+        ),
+        (
+            [0.26, 1.49, 0.29, 1.28, -0.54, -0.05, -0.44],
+            [-0.02, 1.81, 0.0, 1.38, -0.94, 0.03, -0.38],
+            (3.1, 1.5),
+            [0.66, 0.05, -0.81],
+            1.0,
+        ),
+        (
+            [0.52, 1.59, -0.28, 1.47, 0.60, -0.09, 0.19],
+            [0.57, 1.85, -0.68, 1.51, 0.84, 0.21, 0.53],
+            (2.5, 1.2),
+            [0.62, 0.06, -0.75],
+            1.0,
+        ),
+        (
+            [0.55, 1.32, -0.28, 1.76, 0.06, 0.10, -0.35],
+            [0.61, 1.45, 0.07, 1.53, 0.01, 0.20, -0.64],
+            (3.8, 1.6),
+            [0.636, 0.462, -0.649],
+            1.3,
+        ),
+        (
+            [0.20, 1.01, 0.13, 1.31, 0.52, -0.22, -0.12],
+            [0.47, 0.93, -0.22, 1.56, 0.75, 0.11, 0.13],
+            (2.0, 0.5),
+            [1.0, 0.256, 0.069],
+            1.3,
+        ),
+    ];
+    for (number, (start, end, (duration, moment), place, friction)) in cases.into_iter().enumerate() {
+        for compliant in [true, false] {
+            let mut rig = Rig::<f32>::new(start, 1);
+            rig.plant.coulomb *= friction;
+            let expected = compliant.then_some([0.0; 6]);
+            rig.load(&primitive(&Design { start, goal: end, duration, expected, ..Design::default() })).expect("loads");
+            rig.command(Command::Hold);
+            rig.run_for(1.5);
+            rig.command(Command::Run(if compliant { adapting() } else { RunOptions::default() }));
+            rig.run_for(moment);
+            rig.command(Command::SetGoal(goal(Vector3::from(place))));
+            let mut farthest = 0.0f64;
+            while rig.cycle.state() == State::Run {
+                let record = rig.tick(None).record;
+                let away = (0..3).map(|axis| f64::from(record.pose_d[axis] - record.pose[axis]).powi(2)).sum::<f64>();
+                farthest = farthest.max(away.sqrt());
+            }
+            let case = format!("case {number}, compliant {compliant}");
+            assert_eq!((rig.cycle.state(), rig.cycle.fault()), (State::Hold, Fault::None), "{case}");
+            assert!(farthest < 0.24, "{case}: {farthest} m off a goal that is out of reach");
+        }
+    }
 }

@@ -6,6 +6,7 @@ mod authority;
 mod caution;
 mod contact;
 mod disagreement;
+mod drawn;
 mod goals;
 mod hand;
 mod hand_plant;

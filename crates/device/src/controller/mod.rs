@@ -66,8 +66,10 @@ enum BusPhase {
 }
 
 /// The high-priority half of the device.
+///
+/// Its fields stay in their order, the large one last: behind it each of the others would cost an instruction more.
+#[repr(C)]
 pub struct DeviceController {
-    cycle: Cycle<f32, { control::MAX_KERNELS }>,
     number: u64,
     startup: Startup,
     pacer: Pacer,
@@ -92,6 +94,7 @@ pub struct DeviceController {
     refused: u8,
     lateness: Lateness,
     brakes: Brakes,
+    cycle: Cycle<f32, { control::MAX_KERNELS }>,
 }
 
 impl DeviceController {
