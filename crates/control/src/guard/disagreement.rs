@@ -130,14 +130,14 @@ pub(crate) struct Disagreement<R: Real> {
 }
 
 impl<R: Real> Effort<'_, R> {
-    /// The part of what was sent (N m) that turns no joint, as the measured motion of all of them tells it.
+    /// The part of what was sent (N m) that turns no joint, as the measured motion of all of them tells it, but for
+    /// what presses on the environment.
     #[cold]
     #[inline(never)]
     pub(crate) fn resisted(&self) -> Vector7<R> {
-        match self.plan {
-            Plan::Run { observer, friction } => friction - observer.unknown(),
-            Plan::Approach => self.sent,
-        }
+        let Plan::Run { observer, friction } = self.plan else { return self.sent };
+        let resisted = friction - observer.unknown();
+        self.pressing.map_or(resisted, |pressing| resisted - pressing)
     }
 
     /// True if the torque of a motor that turns no joint is more than friction takes; `limit` is the swing of friction
@@ -370,16 +370,18 @@ mod tests {
     }
 
     #[test]
-    fn both_torques_of_a_run_have_to_swing_by_three_and_a_half_times_the_friction() {
+    fn feedback_of_a_run_has_to_swing_by_three_and_a_half_times_the_friction_and_to_turn_nothing() {
         for sign in [1.0, -1.0] {
             let from = Asked { feedback: -sign, sent: -sign, ..RUN };
             for (feedback, sent, expected) in [
-                (2.6, 2.6, Some(STILL + 1)),
+                (2.6, 1.3, Some(STILL + 1)),
+                // It may be against what was fed forward, or other joints.
+                (2.6, -1.3, Some(STILL + 1)),
                 // Three times the friction of the model may hold it, with what other joints swing.
-                (2.4, 2.4, None),
-                // What was fed forward makes up for what was asked for, or is not asked for.
-                (9.0, 2.4, None),
                 (2.4, 9.0, None),
+                // Friction takes it all, or other joints are turned by it.
+                (9.0, 1.1, None),
+                (9.0, -1.1, None),
             ] {
                 let then = Asked { feedback: feedback * sign, sent: sent * sign, ..RUN };
                 assert_eq!(found(&from, &then), expected, "{feedback} {sent} {sign}");
