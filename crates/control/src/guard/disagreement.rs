@@ -80,7 +80,7 @@ pub(crate) enum Plan<'a, R: Real> {
     Approach,
     /// A primitive.
     Run {
-        /// Source of the torque that accelerates the joints.
+        /// Knows what the motion of all joints leaves of the torque that was sent.
         observer: &'a MotionObserver<R>,
         /// Friction that was fed forward (N m).
         friction: &'a Vector7<R>,
