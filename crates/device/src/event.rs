@@ -41,8 +41,9 @@ pub enum EventKind {
     },
     /// The run no longer goes as the successful ones before it.
     Surprised {
-        /// Progress of the movement, 0 to 1.
-        phase: f32,
+        /// Progress of the movement, 0 to 1000: an integer, because the log spells events out, and the code that spells
+        /// a float takes 21 KB of flash.
+        progress: u16,
         /// The channel of the statistics that stands out most.
         channel: u8,
     },
@@ -62,7 +63,14 @@ impl From<control::Event> for EventKind {
             control::Event::Refused(reason) => EventKind::Refused(Refusal::Control(reason)),
             control::Event::Entered(state, fault) => EventKind::Entered(state, fault),
             control::Event::Arrived => EventKind::Arrived,
-            control::Event::Surprised { phase, channel } => EventKind::Surprised { phase, channel },
+            control::Event::Surprised { phase, channel } => {
+                EventKind::Surprised { progress: thousandths(phase), channel }
+            }
         }
     }
+}
+
+/// A share of one in 1/1000, rounded to the nearest; 0 for what is no share.
+fn thousandths(share: f32) -> u16 {
+    (share.clamp(0.0, 1.0) * 1000.0 + 0.5) as u16
 }

@@ -75,7 +75,7 @@ pub(crate) fn event(event: Event) -> Option<LinkEvent> {
             let StartupFailure([code, detail]) = StartupFailure::from(error);
             (LinkKind::Blocked, u16::try_from(code).unwrap_or(u16::MAX), detail)
         }
-        EventKind::Surprised { phase, channel } => (LinkKind::Surprise, channel.into(), thousandths(phase)),
+        EventKind::Surprised { progress, channel } => (LinkKind::Surprise, channel.into(), progress.into()),
         EventKind::Hand { stage, cause } => {
             (LinkKind::Hand, stage.code().into(), cause.map_or(0, |(node, failure)| failure.number(node)))
         }
@@ -84,11 +84,6 @@ pub(crate) fn event(event: Event) -> Option<LinkEvent> {
         }
     };
     Some(LinkEvent { cycle: cycle(event.cycle), kind, code, detail })
-}
-
-/// A share of one in 1/1000, rounded to the nearest; 0 for what is no share.
-fn thousandths(share: f32) -> u32 {
-    (share.clamp(0.0, 1.0) * 1000.0 + 0.5) as u32
 }
 
 /// A cycle record as telemetry, without its cost.

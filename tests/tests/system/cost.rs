@@ -9,6 +9,7 @@ use lab::client::Incoming;
 use lab::primitive_file::PrimitiveFile;
 use lab::procedure;
 use link::{Goal, Name, RunOptions, Telemetry};
+use sim::fault::{FaultKind, Injection, Supervised};
 use system_tests::execution::prepare;
 use system_tests::{Arm, command, expect, ready, simulation};
 
@@ -122,6 +123,23 @@ impl Costs {
         }
     }
 
+    /// Begins runs while the pendant warns: they are held to half of the taught speed.
+    fn begin_warned(&mut self) {
+        let warning = FaultKind::Warning(Supervised::Voltage);
+        let warning = Injection { at: 0.0, lasts: f64::INFINITY, every: 0.0, times: 1, what: warning };
+        simulation(self.arm.transport()).plant().inject(&[warning]);
+        self.cycles("warned", 2 * RATE_HZ);
+        for phase in 0..RENEWAL {
+            for compliant in [true, false] {
+                self.cycles("held", phase);
+                self.begin(compliant);
+                assert!(self.cycle("run").flags & control::flags::SLOWED != 0, "the pendant warns");
+                self.order("run held", |arm| expect(arm.hold()));
+                self.go_to_the_start();
+            }
+        }
+    }
+
     fn state(&mut self) -> Option<State> {
         State::from_code(self.cycle("state").state)
     }
@@ -134,7 +152,7 @@ impl Costs {
     }
 }
 
-/// The change that makes it fail: `MotionObserver::postpone` does nothing, so that a run may begin in the cycle in
+/// The change that makes it fail: `Mass::postpone` does nothing, so that a run may begin in the cycle in
 /// which the mass matrix is renewed.
 #[test]
 fn no_order_and_no_stop_makes_a_control_cycle_longer_than_29_900_instructions() {
@@ -172,10 +190,12 @@ fn no_order_and_no_stop_makes_a_control_cycle_longer_than_29_900_instructions() 
         // Up and aside, where J6 comes to its limit on the way.
         let aside = |y: f32| Goal { position: Some([0.3, y, 0.3]), orientation: None };
         costs.order("goal moved", |arm| expect(arm.set_goal(aside(0.6))));
-        costs.at_a_limit();
-        costs.order("goal moved at a limit", |arm| expect(arm.set_goal(aside(0.59))));
-        costs.at_a_limit();
-        costs.order("speed changed at a limit", |arm| expect(arm.set_speed(0.9)));
+        for phase in 0..RENEWAL {
+            costs.at_a_limit();
+            costs.cycles("run at a limit", phase);
+            costs.order("goal moved at a limit", |arm| expect(arm.set_goal(aside(0.59 + 0.01 * (phase % 2) as f32))));
+            costs.order("speed changed at a limit", |arm| expect(arm.set_speed(0.9 + 0.01 * phase as f32)));
+        }
         costs.order("run held", |arm| expect(arm.hold()));
         costs.go_to_the_start();
     }
@@ -184,6 +204,7 @@ fn no_order_and_no_stop_makes_a_control_cycle_longer_than_29_900_instructions() 
         while State::from_code(costs.cycle("run to its end").state) == Some(State::Run) {}
         costs.go_to_the_start();
     }
+    costs.begin_warned();
     costs.begin(true);
     costs.order("run stopped", |arm| expect(arm.stop()));
     costs.cycles("stopped", RATE_HZ);

@@ -277,7 +277,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let task = TaskReference::from_plan(&plan);
         let grips = options.compliant && grasp == Grasp::Gripping;
         operational.keep(lift.step(&task, grips, deviation.as_ref()));
-        let leisure = self.observer.leaves();
+        let leisure = self.observer.mass.leaves();
         self.soft_limits.renew(leisure == Leisure::Limits);
         let how = (PoseFeedback::of_run(options.compliant), options.acceleration, &mut self.soft_limits);
         let reference = operational.step(&self.model, tracking, measured.frames, measured.state, &task, how);

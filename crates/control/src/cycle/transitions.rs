@@ -90,7 +90,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     /// Begins a move in joint space, after the supervisor has allowed it.
     pub(super) fn begin_approach(&mut self, approach: Approach<R>, measured: &Measured<'_, R>) {
         self.hand.stay();
-        self.observer.postpone();
+        self.observer.mass.postpone();
         if !matches!(self.law, Law::Posture(_)) {
             self.law = Law::Posture(self.posture_here(measured));
         }
@@ -103,7 +103,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
     #[inline(never)]
     pub(super) fn begin_run(&mut self, options: RunOptions, measured: &Measured<'_, R>) {
         self.hand.begin_run();
-        self.observer.postpone();
+        self.observer.mass.postpone();
         // From what the feedback is drawn to while holding, so that the torque against friction stays. An arm that was
         // led aside has nothing to hand over: it would be thrown back.
         let held = if let Law::Posture(posture) = &self.law { posture.held() } else { Some(&measured.state.q) };

@@ -2,6 +2,8 @@
 //!
 //! Less than half the price of a column of inverse dynamics per joint (method of Walker and Orin).
 
+use core::ops::Range;
+
 use nalgebra::{SMatrix, Vector3};
 
 use crate::model::arm::{ArmModel, Body};
@@ -10,6 +12,7 @@ use crate::real::Real;
 use crate::units::JOINTS;
 
 /// The six numbers of a symmetric 3x3 matrix: an inertia (kg m^2).
+#[derive(Clone, Debug)]
 struct Inertia<R: Real> {
     xx: R,
     yy: R,
@@ -54,7 +57,8 @@ fn turned<R: Real>(a: R, b: R, ab: R, s: R, c: R) -> (R, R, R) {
 }
 
 /// Links beyond a joint, as one rigid body in the axes of some frame, about its origin.
-struct Composite<R: Real> {
+#[derive(Clone, Debug)]
+pub(crate) struct Composite<R: Real> {
     mass: R,
     /// Mass times centre of mass (kg m).
     moment: Vector3<R>,
@@ -62,7 +66,7 @@ struct Composite<R: Real> {
 }
 
 impl<R: Real> Composite<R> {
-    fn nothing() -> Self {
+    pub(crate) fn nothing() -> Self {
         let zero = R::constant(0.0);
         let inertia = Inertia { xx: zero, yy: zero, zz: zero, xy: zero, xz: zero, yz: zero };
         Self { mass: zero, moment: Vector3::zeros(), inertia }
@@ -96,8 +100,46 @@ impl<R: Real> ArmModel<R> {
     /// Mass matrix of the links and the payload, without rotors (kg m^2).
     pub fn link_mass_matrix(&self, frames: &Frames<R>) -> SMatrix<R, JOINTS, JOINTS> {
         let mut matrix = SMatrix::<R, JOINTS, JOINTS>::zeros();
-        let mut composite = Composite::nothing();
-        for joint in (0..JOINTS).rev() {
+        self.sweep(frames, &mut Composite::nothing(), 0..JOINTS, &mut matrix);
+        matrix
+    }
+
+    /// Mass matrix as the motors feel it: links, payload and reflected rotors (kg m^2).
+    pub fn mass_matrix(&self, frames: &Frames<R>) -> SMatrix<R, JOINTS, JOINTS> {
+        let mut matrix = SMatrix::<R, JOINTS, JOINTS>::zeros();
+        self.gather(frames, &mut Composite::nothing(), 0..JOINTS, &mut matrix);
+        matrix
+    }
+
+    /// The part of the mass matrix that these joints have with each other and with those before them; `composite` is
+    /// what lies beyond them, and takes them in.
+    #[inline(never)]
+    pub(crate) fn gather(
+        &self,
+        frames: &Frames<R>,
+        composite: &mut Composite<R>,
+        joints: Range<usize>,
+        matrix: &mut SMatrix<R, JOINTS, JOINTS>,
+    ) {
+        self.sweep(frames, composite, joints.clone(), matrix);
+        if joints.contains(&5) {
+            matrix[(4, 5)] += self.reflected_inertia_j5_j6;
+            matrix[(5, 4)] += self.reflected_inertia_j5_j6;
+        }
+        for joint in joints {
+            matrix[(joint, joint)] += self.reflected_inertia[joint];
+        }
+    }
+
+    /// The same without rotors.
+    fn sweep(
+        &self,
+        frames: &Frames<R>,
+        composite: &mut Composite<R>,
+        joints: Range<usize>,
+        matrix: &mut SMatrix<R, JOINTS, JOINTS>,
+    ) {
+        for joint in joints.rev() {
             composite.add(&self.bodies[joint]);
             composite.shift(&self.link_vector(joint));
             composite.moment = self.inward(frames, joint, &composite.moment);
@@ -116,17 +158,5 @@ impl<R: Real> ArmModel<R> {
                 matrix[(before, joint)] = moment.z;
             }
         }
-        matrix
-    }
-
-    /// Mass matrix as the motors feel it: links, payload and reflected rotors (kg m^2).
-    pub fn mass_matrix(&self, frames: &Frames<R>) -> SMatrix<R, JOINTS, JOINTS> {
-        let mut matrix = self.link_mass_matrix(frames);
-        for (joint, inertia) in self.reflected_inertia.iter().enumerate() {
-            matrix[(joint, joint)] += *inertia;
-        }
-        matrix[(4, 5)] += self.reflected_inertia_j5_j6;
-        matrix[(5, 4)] += self.reflected_inertia_j5_j6;
-        matrix
     }
 }

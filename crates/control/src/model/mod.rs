@@ -6,7 +6,7 @@ pub mod dynamics;
 pub(crate) mod friction;
 pub mod hand;
 pub mod kinematics;
-mod mass_matrix;
+pub(crate) mod mass_matrix;
 mod redundancy;
 pub mod wam7;
 pub mod weight;

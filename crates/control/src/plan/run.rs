@@ -169,13 +169,12 @@ impl<R: Real, const N: usize> Run<R, N> {
             end: R::constant(1.0),
             load: R::constant(0.0),
             speed: options.speed,
-            slow: false,
+            slow,
         };
         run.inertia.take_on(primitive);
         // The first speed acts at once; later ones are approached at the rollout's slew rate.
         run.rollout.set_speed_slew(None).map_err(reason)?;
-        set_speed(&mut run.rollout, primitive, options.speed)?;
-        run.hold_back(primitive, slow);
+        run.set_speed(primitive, options.speed)?;
         run.rollout.set_speed_slew(Some(R::constant(Rollout::<R, N>::DEFAULT_SLEW))).map_err(reason)?;
         run.set_goal(primitive, &options.goal)?;
         *place = Some(run);
@@ -258,13 +257,17 @@ impl<R: Real, const N: usize> Run<R, N> {
         self.rollout.is_finished() && self.rollout.progress() >= self.end
     }
 
-    /// Takes a new speed factor.
+    /// Takes a new speed factor; what the rollout refuses as too fast is out of range as well, also while the speed is
+    /// held back: it comes back to this factor.
     pub(crate) fn set_speed(&mut self, primitive: &Primitive<R, N>, factor: f32) -> Result<(), Refusal> {
         if !(factor >= SPEEDS.0 && factor <= SPEEDS.1) {
             return Err(Refusal::OutOfRange);
         }
-        let held = if self.slow && factor > HELD_BACK { HELD_BACK } else { factor };
-        set_speed(&mut self.rollout, primitive, held)?;
+        let mut set = |factor: f32| self.rollout.set_speed(primitive.movement(), R::constant(f64::from(factor)));
+        set(factor).map_err(reason)?;
+        if self.slow && factor > HELD_BACK {
+            set(HELD_BACK).map_err(reason)?;
+        }
         self.speed = factor;
         Ok(())
     }
@@ -444,18 +447,6 @@ fn checked_goal<R: Real, const N: usize>(
         orientation = Some(wanted.renormalised());
     }
     Ok((position, orientation))
-}
-
-/// Takes a new speed factor; what the rollout refuses as too fast is out of range as well.
-fn set_speed<R: Real, const N: usize>(
-    rollout: &mut Rollout<R, N>,
-    primitive: &Primitive<R, N>,
-    factor: f32,
-) -> Result<(), Refusal> {
-    if !(factor >= SPEEDS.0 && factor <= SPEEDS.1) {
-        return Err(Refusal::OutOfRange);
-    }
-    rollout.set_speed(primitive.movement(), R::constant(f64::from(factor))).map_err(reason)
 }
 
 /// Every reason a rollout gives is a number out of range.

@@ -7,6 +7,7 @@ pub mod filter;
 pub mod hand;
 pub mod joints;
 pub mod leisure;
+mod mass;
 pub mod observer;
 pub mod sample;
 pub mod swing;

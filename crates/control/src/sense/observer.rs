@@ -6,14 +6,12 @@
 //! hertz, below every swing of the cables. An acceleration that the torque does not explain (friction, contact, masses
 //! that differ from the model) is a third state, slower still.
 
-use nalgebra::SMatrix;
-
 use crate::model::arm::ArmModel;
 use crate::model::kinematics::Frames;
 use crate::real::{Real, at_least, within};
 use crate::sense::correction::Correction;
 use crate::sense::joints::JointState;
-use crate::sense::leisure::Leisure;
+use crate::sense::mass::Mass;
 use crate::sense::swing::Swings;
 use crate::time::{PERIOD, RATE, few_periods};
 use crate::units::{JOINTS, JointPositions, Vector7};
@@ -31,9 +29,6 @@ const DISTURBANCE_POLE: f64 = 2.0;
 /// Poles of the correction and of the unexplained acceleration (Hz) in every other state than a compliant run: where
 /// the joints are stiffer, the shoulder's lie lower.
 const STIFF_POLES: ([f64; JOINTS], f64) = ([3.5, 3.0, 3.5, 5.0, 12.0, 12.0, 12.0], 1.5);
-
-/// Time after which the mass matrix is renewed: 27 ms, in control periods.
-const RENEWAL: u8 = few_periods(0.027);
 
 /// Largest difference from the measured velocity (rad/s): a person who shoves the arm is in no model.
 const FARTHEST: f64 = 0.5;
@@ -89,16 +84,13 @@ pub struct MotionObserver<R: Real> {
     swings: Swings<R>,
     /// Accelerations by the torques sent last and before.
     sent: [Vector7<R>; 2],
-    mass: SMatrix<R, JOINTS, JOINTS>,
-    /// Lower triangle of its `L D L^T`: `L` below the diagonal, `1/D` on it.
-    factor: SMatrix<R, JOINTS, JOINTS>,
-    /// Control periods since the mass matrix was renewed.
-    cycle: u8,
-    ready: bool,
+    /// Inertia of the arm, renewed as torque is sent.
+    pub(crate) mass: Mass<R>,
 }
 
 impl<R: Real> MotionObserver<R> {
     /// Nothing is known yet.
+    #[inline(never)]
     pub fn new() -> Self {
         MotionObserver {
             correction: [
@@ -111,10 +103,7 @@ impl<R: Real> MotionObserver<R> {
             still: [0; JOINTS],
             swings: Swings::new(),
             sent: [Vector7::zeros(); 2],
-            mass: SMatrix::zeros(),
-            factor: SMatrix::zeros(),
-            cycle: 0,
-            ready: false,
+            mass: Mass::new(),
         }
     }
 
@@ -162,7 +151,7 @@ impl<R: Real> MotionObserver<R> {
     /// Torque (N m) of what the model does not know, friction mostly, as the measured motion tells it.
     #[inline(never)]
     pub fn unknown(&self) -> Vector7<R> {
-        self.mass * self.disturbance
+        self.mass.matrix() * self.disturbance
     }
 
     /// Positions (rad), kept near the measured ones.
@@ -199,39 +188,11 @@ impl<R: Real> MotionObserver<R> {
     /// for it.
     #[inline(never)]
     pub fn send(&mut self, model: &ArmModel<R>, frames: &Frames<R>, wanted: &Vector7<R>, beyond: &Vector7<R>) {
-        // The posture changes little within [`RENEWAL`] cycles; the two halves of the work never fall into one but the
-        // first.
-        match self.cycle {
-            0 => self.mass = model.mass_matrix(frames),
-            1 => self.factorise(),
-            _ => {}
-        }
-        if !self.ready {
-            self.factorise();
-            self.ready = true;
-        }
-        self.cycle = (self.cycle + 1) % RENEWAL;
-        let next = wanted + self.accelerated(beyond);
+        self.mass.renew(model, frames);
+        let next = wanted + self.mass.accelerated(beyond);
         // What is not a number would stay for good.
         let known = next.iter().all(|value| value.is_finite_number());
         self.sent = [if known { next } else { Vector7::zeros() }, self.sent[0]];
-    }
-
-    /// The work for which this control period leaves time.
-    pub fn leaves(&self) -> Leisure {
-        match self.cycle {
-            0 | 1 => Leisure::None,
-            even if even % 2 == 0 => Leisure::Limits,
-            _ => Leisure::Goal,
-        }
-    }
-
-    /// This control period has a change of state to compute: a renewal of the mass matrix that is due waits for the
-    /// next one. Without this the longest cycle of a run depends on the moment at which a person begins it.
-    pub fn postpone(&mut self) {
-        if self.ready && self.cycle <= 1 {
-            self.cycle = RENEWAL - 1;
-        }
     }
 
     /// Takes a torque (N m) that will be sent from now on and that friction holds.
@@ -239,53 +200,8 @@ impl<R: Real> MotionObserver<R> {
     pub fn hold_back(&mut self, torque: &Vector7<R>) {
         // Before the first mass matrix no torque accelerates anything.
         if *torque != Vector7::zeros() {
-            self.disturbance -= self.accelerated(torque);
+            self.disturbance -= self.mass.accelerated(torque);
         }
-    }
-
-    /// `L D L^T` of the mass matrix: `L` below the diagonal, `1/D` on it.
-    #[inline(never)]
-    fn factorise(&mut self) {
-        let mut factor = self.mass;
-        for j in 0..JOINTS {
-            for i in j..JOINTS {
-                let mut sum = factor[(i, j)];
-                for k in 0..j {
-                    // Rows of `L` hold `L D` until their diagonal is reached.
-                    sum -= factor[(i, k)] * factor[(j, k)] * self.factor[(k, k)];
-                }
-                factor[(i, j)] = sum;
-            }
-            self.factor[(j, j)] = R::constant(1.0) / factor[(j, j)];
-        }
-        for j in 0..JOINTS {
-            let inverse = self.factor[(j, j)];
-            for i in j + 1..JOINTS {
-                self.factor[(i, j)] = factor[(i, j)] * inverse;
-            }
-        }
-    }
-
-    /// Acceleration of the joints by a torque (N m).
-    #[inline(never)]
-    fn accelerated(&self, torque: &Vector7<R>) -> Vector7<R> {
-        let mut x = *torque;
-        for j in 0..JOINTS {
-            for i in j + 1..JOINTS {
-                let part = self.factor[(i, j)] * x[j];
-                x[i] -= part;
-            }
-        }
-        for j in 0..JOINTS {
-            x[j] *= self.factor[(j, j)];
-        }
-        for j in (0..JOINTS).rev() {
-            for i in j + 1..JOINTS {
-                let part = self.factor[(i, j)] * x[i];
-                x[j] -= part;
-            }
-        }
-        x
     }
 }
 
@@ -313,71 +229,6 @@ mod tests {
     use crate::units::JointPositions;
 
     const POSTURE: [f64; JOINTS] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
-
-    #[test]
-    fn a_torque_is_taken_for_the_acceleration_that_the_mass_matrix_gives_it_in_every_cycle() {
-        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
-        let frames = Frames::new(&model, &JointPositions::from_array(POSTURE));
-        let wanted = Vector7::from([0.5, -1.0, 2.0, 0.3, -4.0, 5.0, 6.0]);
-        let torque = model.mass_matrix(&frames) * wanted;
-        let mut observer = MotionObserver::new();
-        for _ in 0..3 * RENEWAL {
-            observer.send(&model, &frames, &Vector7::zeros(), &torque);
-            assert!((observer.sent[0] - wanted).amax() < 1e-9, "{}", observer.sent[0]);
-        }
-    }
-
-    #[test]
-    fn the_mass_matrix_follows_the_posture_within_two_renewals() {
-        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
-        let [before, now] = [[0.0; JOINTS], POSTURE].map(|q| Frames::new(&model, &JointPositions::from_array(q)));
-        let wanted = Vector7::from([0.5, -1.0, 2.0, 0.3, -4.0, 5.0, 6.0]);
-        let torque = model.mass_matrix(&now) * wanted;
-        let mut observer = MotionObserver::new();
-        observer.send(&model, &before, &Vector7::zeros(), &torque);
-        assert!((observer.sent[0] - wanted).amax() > 0.1, "{}", observer.sent[0]);
-        for _ in 0..2 * RENEWAL {
-            observer.send(&model, &now, &Vector7::zeros(), &torque);
-        }
-        assert!((observer.sent[0] - wanted).amax() < 1e-9, "{}", observer.sent[0]);
-    }
-
-    /// The change that makes it fail: `postpone` does nothing, or postpones for longer than a cycle.
-    #[test]
-    fn a_postponed_renewal_comes_in_the_cycle_after() {
-        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
-        let [before, now] = [[0.0; JOINTS], POSTURE].map(|q| Frames::new(&model, &JointPositions::from_array(q)));
-        for phase in 0..RENEWAL {
-            let mut observer = MotionObserver::new();
-            let send = |observer: &mut MotionObserver<f64>, frames: &Frames<f64>| {
-                let known = (observer.mass, observer.factor);
-                observer.send(&model, frames, &Vector7::zeros(), &Vector7::zeros());
-                (observer.mass, observer.factor) != known
-            };
-            for _ in 0..RENEWAL + phase {
-                send(&mut observer, &before);
-            }
-            observer.postpone();
-            assert!(!send(&mut observer, &now), "renewed in phase {phase}");
-            assert!(phase > 1 || send(&mut observer, &now), "one that was due in phase {phase} is late");
-            for _ in 0..RENEWAL {
-                send(&mut observer, &now);
-            }
-            assert_eq!(observer.mass, model.mass_matrix(&now), "phase {phase}");
-        }
-    }
-
-    #[test]
-    fn a_postponement_before_the_first_mass_matrix_changes_nothing() {
-        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
-        let frames = Frames::new(&model, &JointPositions::from_array(POSTURE));
-        let wanted = Vector7::from([0.5, -1.0, 2.0, 0.3, -4.0, 5.0, 6.0]);
-        let torque = model.mass_matrix(&frames) * wanted;
-        let mut observer = MotionObserver::new();
-        observer.postpone();
-        observer.send(&model, &frames, &Vector7::zeros(), &torque);
-        assert!((observer.sent[0] - wanted).amax() < 1e-9, "{}", observer.sent[0]);
-    }
 
     #[test]
     fn a_torque_that_is_no_number_is_forgotten() {

@@ -102,6 +102,23 @@ fn g14_a_run_that_begins_derated_is_slow_from_its_first_cycle() {
     assert_ne!(phases(Caution::None, 2.0), half);
 }
 
+/// The change that makes it fail: only the speed that the run is held to is looked at; then nothing refuses the other
+/// one, and the run stays slow once the warning is over.
+#[test]
+fn g14_a_speed_that_a_movement_cannot_have_is_refused_also_while_the_arm_is_held_back() {
+    for caution in [Caution::None, Caution::Slowed] {
+        let mut rig = holding();
+        // As short and as stiff as this takes no more than 1.4 times its speed.
+        let movement = Design { duration: 0.5, stiffness: 8e3, goal: START, bent: false, ..Design::default() };
+        rig.load(&primitive(&movement)).expect("loads");
+        rig.cycle.set_caution(caution);
+        let run = |speed| Command::Run(RunOptions { speed, ..RunOptions::default() });
+        refused(rig.tick(Some(run(2.0))), Refusal::OutOfRange);
+        rig.command(run(0.5));
+        refused(rig.tick(Some(Command::SetSpeed { factor: 2.0 })), Refusal::OutOfRange);
+    }
+}
+
 /// The change that makes it fail: an approach begins as if nothing had been found.
 #[test]
 fn g14_an_approach_that_begins_derated_takes_twice_the_time() {

@@ -72,6 +72,8 @@ pub(crate) struct Design {
     /// Where the fingers close to (rad).
     pub(crate) closed: f64,
     pub(crate) bent: bool,
+    /// Stiffness K of every row.
+    pub(crate) stiffness: f64,
 }
 
 impl Default for Design {
@@ -86,6 +88,7 @@ impl Default for Design {
             recorded: None,
             closed: 0.25,
             bent: true,
+            stiffness: 200.0,
         }
     }
 }
@@ -93,8 +96,9 @@ impl Default for Design {
 /// The primitive, checked as the device checks it.
 pub(crate) fn primitive<R: Real>(design: &Design) -> Primitive<R, KERNELS> {
     let zero = R::constant(0.0);
-    let stiffness = R::constant(200.0);
-    let critical = R::constant(2.0 * 200f64.sqrt());
+    let stiffness = R::constant(design.stiffness);
+    let critical = R::constant(2.0 * design.stiffness.sqrt());
+    let quick = R::constant((2.0 * design.stiffness).sqrt());
     let weights = if design.bent { weights() } else { vec![zero; ROWS * KERNELS] };
     let [p, o, h] = design.sensitivity;
     let feedback = design.expected.map(|_| {
@@ -120,7 +124,7 @@ pub(crate) fn primitive<R: Real>(design: &Design) -> Primitive<R, KERNELS> {
         activation: R::constant(0.7),
         kernel_count: KERNELS,
         weights: &weights,
-        gains: gains([stiffness; 4], [critical, R::constant(20.0), critical, critical]),
+        gains: gains([stiffness; 4], [critical, quick, critical, critical]),
         orientation_error: OrientationError::Quaternion,
         hemisphere: Hemisphere::Nearest,
         start: configuration(design.start, [0.0, 0.25, 0.25, 0.25]),

@@ -80,7 +80,7 @@ impl Puck {
         Some(match property {
             Property::Stat => if awake { Status::Ready } else { Status::Reset }.value(),
             Property::Role => self.beyond_angle.map_or(0, |_| Role::ABSOLUTE_ANGLE.into()),
-            Property::Mech => (self.position.0 - self.beyond_angle?).rem_euclid(4096),
+            Property::Mech => self.position.0.wrapping_sub(self.beyond_angle?).rem_euclid(4096),
             Property::Vers => {
                 if awake {
                     self.version
@@ -433,7 +433,8 @@ impl Bus {
                 let active = puck.mode != MotorMode::Idle && now_us > self.pressed_us + 100_000;
                 assert!(!active, "zeroed under torque");
                 if !puck.ignores_position_writes {
-                    puck.beyond_angle = puck.beyond_angle.map(|counts| counts + value - puck.position.0);
+                    puck.beyond_angle =
+                        puck.beyond_angle.map(|counts| counts.wrapping_add(value).wrapping_sub(puck.position.0));
                     puck.position = Counts(value);
                 }
             }

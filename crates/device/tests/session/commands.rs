@@ -227,7 +227,7 @@ fn every_refusal_of_the_control_half_reaches_the_host() {
 #[test]
 fn a_surprise_and_the_stages_of_the_hand_are_told() {
     let mut rig = Rig::greeted();
-    rig.event(EventKind::Surprised { phase: 0.625, channel: 7 });
+    rig.event(control::Event::Surprised { phase: 0.6254, channel: 7 }.into());
     let cause = Some((puck::Node::FINGERS[1], HandFailure::Silent));
     rig.event(EventKind::Hand { stage: HandStage::Failed, cause });
     let told: Vec<_> = events(&mut rig).iter().map(|event| (event.kind, event.code, event.detail)).collect();
