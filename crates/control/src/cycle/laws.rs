@@ -34,6 +34,13 @@ const TAUGHT_SPEED: f64 = 0.18;
 /// itself.
 const BRAKED_SPEED: f64 = 0.30;
 
+/// Speed of elbow or forearm from which on a stop brakes harder (m/s), and the one from which it brakes hardest. At
+/// 1.0 m/s the safety module takes the arm, and its brakes let it sink.
+const BRAKED_HARDER: (f64, f64) = (0.3, 0.7);
+
+/// Rate at which the hardest brake takes the speed of every joint (1/s), beside its damping.
+const BRAKE_RATE: f64 = 10.0;
+
 /// Age up to which a load that a silent sensor measured last is believed: 0.3 s, in control periods.
 const BORNE_AGE: u8 = few_periods(0.3);
 
@@ -125,6 +132,16 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         self.model.gravity_torque(&Frames::new(&self.model, &q)).0
     }
 
+    /// Torque (N m) that takes the speed of an arm which the safety module would take soon. All joints lose theirs at
+    /// one rate: a damping that is as strong for the forearm swings a joint that turns little.
+    fn brake(&self, measured: &Measured<'_, R>, velocity: &Vector7<R>) -> Vector7<R> {
+        let (from, to) = BRAKED_HARDER;
+        let [elbow, tip, _] = measured.frames.watched_speeds(&measured.state.dq, R::constant(TIP_REACH));
+        let share = (at_least(elbow, tip) - R::constant(from)) * R::constant(1.0 / (to - from));
+        let share = at_most(at_least(share, R::constant(0.0)), R::constant(1.0));
+        self.observer.mass.matrix() * velocity * (share * R::constant(BRAKE_RATE))
+    }
+
     /// Gravity compensation; damped while it builds up after arming, and while the hand is faster than a person
     /// teaches.
     fn float(&self, measured: &Measured<'_, R>) -> Demand<R> {
@@ -138,11 +155,8 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
         let (light, full) = (&self.gains.lead_damping, &self.gains.stop_damping);
         let share = at_most(at_least(share, R::constant(0.0)), R::constant(1.0));
-        torque -= (light + (full - light) * share).component_mul(&self.observer.velocity(
-            measured.state,
-            Trust::Stiff,
-            &Vector7::zeros(),
-        ));
+        let velocity = self.observer.velocity(measured.state, Trust::Stiff, &Vector7::zeros());
+        torque -= (light + (full - light) * share).component_mul(&velocity) + self.brake(measured, &velocity);
         Demand { explained: (gravity, Vector7::zeros()), ..self.plain(measured, torque) }
     }
 
@@ -199,7 +213,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         let load = support.torque(measured.frames);
         let gravity = self.steady_gravity(measured);
         let velocity = self.observer.velocity(measured.state, Trust::Stiff, &Vector7::zeros());
-        let damping = self.gains.stop_damping.component_mul(&velocity);
+        let damping = self.gains.stop_damping.component_mul(&velocity) + self.brake(measured, &velocity);
         let demand = self.plain(measured, gravity * share + rest + load - damping);
         Demand { explained: (gravity, Vector7::zeros()), ..demand }
     }

@@ -3,7 +3,9 @@
 use std::collections::VecDeque;
 
 use control::command::{Command, Refusal, RunOptions};
+use control::guard::monitor::TIP_REACH;
 use control::time::periods;
+use control::units::JointVelocities;
 use control::{Event, Fault, PERIOD, State};
 use nalgebra::Vector3;
 
@@ -30,6 +32,8 @@ struct Outcome {
     /// Largest distance of a reported joint speed from those that the joint had in the last 30 ms, in parts of the
     /// fastest (1 rad/s at least).
     unseen: f64,
+    /// Fastest elbow, or point of the forearm that the safety module watches (m/s).
+    forearm: f64,
     state: State,
     fault: Fault,
 }
@@ -49,6 +53,7 @@ fn shove(rig: &mut Rig<f32>, direction: [f64; 3], force: f64, seconds: f64) -> O
         energy: 0.0,
         braked: 0.0,
         unseen: 0.0,
+        forearm: 0.0,
         state: State::Idle,
         fault: Fault::None,
     };
@@ -69,6 +74,8 @@ fn shove(rig: &mut Rig<f32>, direction: [f64; 3], force: f64, seconds: f64) -> O
         }
         assert!(output.record.state.has_torque(), "cycle {cycle} at {:.2} m/s: {:?}", hand_speed(rig), output.record);
         let speed = hand_speed(rig);
+        let [elbow, tip, _] = rig.plant.frames().watched_speeds(&JointVelocities(rig.plant.dq), TIP_REACH);
+        outcome.forearm = outcome.forearm.max(elbow).max(tip);
         let part = if pushing { &mut outcome.pushed } else { &mut outcome.after };
         *part = part.max(speed);
         let now = output.record.pose_d;
@@ -394,9 +401,10 @@ fn g1_an_outstretched_arm_that_its_elbow_was_leaned_on_is_used_again_after_its_s
     }
 }
 
-/// 201 shoves from this number on; how many leave the hand too fast, how many cost the zero, and the fastest (m/s).
-fn shoves(from: usize) -> (usize, usize, f64) {
-    let (mut late, mut zeros, mut worst) = (0, 0, 0.0f64);
+/// 201 shoves from this number on: how many leave the hand too fast, how many cost the zero, in how many the safety
+/// module would take the arm from 1.0 m/s on, and the fastest (m/s).
+fn shoves(from: usize) -> (usize, usize, usize, f64) {
+    let (mut late, mut zeros, mut taken, mut worst) = (0, 0, 0, 0.0f64);
     for index in from..from + 201 {
         let state = [State::Gravity, State::Hold, State::Run][index % 3];
         let force = 10.0 + 70.0 * fraction(index, 0.618_034);
@@ -413,22 +421,28 @@ fn shoves(from: usize) -> (usize, usize, f64) {
         assert_eq!(outcome.state == State::SoftStop, outcome.fault != Fault::None, "{what}");
         worst = worst.max(outcome.braked);
         late += usize::from(outcome.braked >= BRAKED);
+        taken += usize::from(outcome.forearm >= 1.0);
         if outcome.state == State::SoftStop {
             zeros += usize::from(recovers(&mut rig));
         }
     }
     println!(
-        "{late} of 201 faster than {BRAKED} m/s 0.3 s after the push, the fastest {worst:.2} m/s; {zeros} zeros lost"
+        "{late} of 201 faster than {BRAKED} m/s 0.3 s after the push, the fastest {worst:.2} m/s; {zeros} zeros lost; \
+         {taken} for the safety module"
     );
-    (late, zeros, worst)
+    (late, zeros, taken, worst)
 }
 
+/// The safety module takes the arm away from its torque where elbow or forearm are at 1.0 m/s, and its brakes let the
+/// arm sink faster than 0.25 m/s. What is left (59 and 55 of 201, before 94 and 98) has all the torque against it that
+/// the limits leave.
+///
+/// The change that makes it fail: a stop has no more than its damping, however fast the forearm is.
 #[test]
 fn g1_a_shove_of_up_to_10_n_s_in_teach_hold_and_run_is_braked_with_torque_and_seen() {
-    // One of them, 10 N s in 0.13 s, throws the hand at 4.7 m/s: all the torque there is leaves 0.28 m/s.
-    for (from, too_fast) in [(0, 1), (1005, 0)] {
-        let (late, zeros, worst) = shoves(from);
-        assert!(late <= too_fast && zeros == 0 && worst < 0.3, "{late}, {zeros}, {worst}");
+    for from in [0, 1005] {
+        let (late, zeros, taken, worst) = shoves(from);
+        assert!(late == 0 && zeros == 0 && taken < 65, "{late}, {zeros}, {taken}, {worst}");
     }
 }
 
@@ -475,6 +489,6 @@ fn g1_a_shove_in_a_compliant_run_gets_no_more_energy_than_it_brought() {
 
 #[test]
 fn g1_shoves_that_no_limit_was_chosen_on_are_braked_as_well() {
-    let (late, zeros, worst) = shoves(2010);
+    let (late, zeros, _, worst) = shoves(2010);
     assert!(late == 0 && zeros == 0, "{late}, {zeros}, {worst}");
 }
