@@ -1,6 +1,7 @@
 //! The STM32H743 image executed on an emulated chip.
 
 pub mod bank;
+pub mod bank_file;
 pub mod board;
 pub mod cache;
 pub mod can;

@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// The change that makes it fail: two parts of a renewal fall into one control period.
+    /// The change that makes it fail: a period that gathers the matrix leaves time for something else.
     #[test]
     fn what_can_wait_waits_while_the_matrix_is_gathered() {
         let model = ArmModel::<f64>::new(Payload::SensorAndHand);

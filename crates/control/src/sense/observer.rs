@@ -230,6 +230,17 @@ mod tests {
 
     const POSTURE: [f64; JOINTS] = [-0.49, 1.56, 1.47, 1.85, -0.17, -0.58, 1.75];
 
+    /// The change that makes it fail: the torque beyond the model accelerates nothing.
+    #[test]
+    fn what_was_sent_is_the_acceleration_that_was_wanted_and_that_of_the_torque_beyond_it() {
+        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+        let frames = Frames::new(&model, &JointPositions::from_array(POSTURE));
+        let wanted = Vector7::from([0.5, -1.0, 2.0, 0.3, -4.0, 5.0, 6.0]);
+        let mut observer = MotionObserver::new();
+        observer.send(&model, &frames, &wanted, &(model.mass_matrix(&frames) * wanted * 2.0));
+        assert!((observer.sent[0] - wanted * 3.0).amax() < 1e-9, "{}", observer.sent[0]);
+    }
+
     #[test]
     fn a_torque_that_is_no_number_is_forgotten() {
         let model = ArmModel::<f64>::new(Payload::SensorAndHand);

@@ -22,8 +22,9 @@ use crate::transport::LineKind;
 /// The board whose image the emulator executes, as its image says it.
 const BOARD: &str = "nucleo-h743zi2";
 
-/// Longest time for the emulator to write bank 2 and its report when the power is switched off.
-const END_TIMEOUT: Duration = Duration::from_secs(10);
+/// Longest time for the emulator to write bank 2 and its report when the power is switched off. Much, because one that
+/// is killed instead forgets what was stored: a busy machine has needed more than 10 s.
+const END_TIMEOUT: Duration = Duration::from_secs(120);
 
 /// Exit status of an emulator that cannot begin: its options or the image are not to its liking.
 const REFUSED: i32 = 2;
