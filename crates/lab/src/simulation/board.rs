@@ -22,9 +22,12 @@ use crate::transport::LineKind;
 /// The board whose image the emulator executes, as its image says it.
 const BOARD: &str = "nucleo-h743zi2";
 
-/// Longest time for the emulator to write bank 2 and its report when the power is switched off. Much, because one that
-/// is killed instead forgets what was stored: a busy machine has needed more than 10 s.
-const END_TIMEOUT: Duration = Duration::from_secs(120);
+/// Longest time for an emulator that says nothing more to end.
+const END_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Longest time for it to write bank 2 and its report when the power is switched off. Much, because one that is killed
+/// instead forgets what was stored: a busy machine has needed more than 10 s.
+const KEEPING_TIMEOUT: Duration = Duration::from_secs(120);
 
 /// Exit status of an emulator that cannot begin: its options or the image are not to its liking.
 const REFUSED: i32 = 2;
@@ -105,7 +108,7 @@ impl EmulatedBoard {
     /// Why the emulator has ended by itself.
     fn ended(&mut self) -> SimulationError {
         self.lockstep = None;
-        let status = self.wait();
+        let status = self.wait(END_TIMEOUT);
         let words = self.last_output();
         match status {
             Some(status) if status.code() == Some(REFUSED) => SimulationError::BoardRefused(words),
@@ -120,9 +123,9 @@ impl EmulatedBoard {
         if words.trim().is_empty() { "nothing".to_owned() } else { words.trim().to_owned() }
     }
 
-    /// Waits for it to end by itself; `None`: it did not and was killed.
-    fn wait(&mut self) -> Option<ExitStatus> {
-        let deadline = Instant::now() + END_TIMEOUT;
+    /// Waits for it to end by itself; `None`: it did not within this time and was killed.
+    fn wait(&mut self, longest: Duration) -> Option<ExitStatus> {
+        let deadline = Instant::now() + longest;
         loop {
             match self.child.try_wait() {
                 Ok(Some(status)) => return Some(status),
@@ -171,7 +174,7 @@ impl Drop for EmulatedBoard {
         // Its output stays open meanwhile: a request that is under way must not fail.
         let (_output, input) = lockstep.into_streams();
         drop(input);
-        let ended = self.wait();
+        let ended = self.wait(KEEPING_TIMEOUT);
         if !ended.is_some_and(|status| status.success()) {
             // Nobody is left to take an error, but a bank 2 or a report that was not written must not go unnoticed.
             let how = ended.map_or_else(|| "had to be killed".to_owned(), |status| format!("ended with {status}"));
