@@ -33,8 +33,8 @@ pub(crate) fn content(path: &Path) -> Result<Vec<u8>, FileError> {
     Ok(bytes)
 }
 
-/// Keeps the content of bank 2. Written beside its file, which it then takes the place of: an emulator that is killed
-/// meanwhile leaves the old bank whole.
+/// Keeps the content of a file. Written beside it, it then takes its place: an emulator that is killed meanwhile
+/// leaves the old one whole.
 pub(crate) fn keep(path: &Path, content: &[u8]) -> Result<(), FileError> {
     let mut beside = path.as_os_str().to_owned();
     beside.push(".new");
@@ -67,7 +67,7 @@ pub(crate) fn keep_damaged(path: &Path, damaged: &BTreeSet<u32>) -> Result<(), F
         return if path.exists() { file(&path, std::fs::remove_file(&path)) } else { Ok(()) };
     }
     let text: String = damaged.iter().map(|address| format!("{address:#010x}\n")).collect();
-    file(&path, std::fs::write(&path, text))
+    keep(&path, text.as_bytes())
 }
 
 #[cfg(test)]

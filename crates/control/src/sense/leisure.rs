@@ -3,7 +3,7 @@
 /// Work for which a control period leaves time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Leisure {
-    /// Nothing: the mass matrix or its factor is renewed.
+    /// Nothing: the mass matrix is gathered.
     None,
     /// Rates of the other joints instead of one that is at its limit.
     Limits,

@@ -434,8 +434,7 @@ fn shoves(from: usize) -> (usize, usize, usize, f64) {
 }
 
 /// The safety module takes the arm away from its torque where elbow or forearm are at 1.0 m/s, and its brakes let the
-/// arm sink faster than 0.25 m/s. What is left (59 and 55 of 201, before 94 and 98) has all the torque against it that
-/// the limits leave.
+/// arm sink faster than 0.25 m/s. 59 and 55 of 201 are left; without the brake it is 94 and more.
 ///
 /// The change that makes it fail: a stop has no more than its damping, however fast the forearm is.
 #[test]
