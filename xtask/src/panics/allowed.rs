@@ -91,12 +91,6 @@ const DEPENDENCIES: &[Allowed] = &[
         &[Index, Message, Unwrap],
         "lengths are held against page and buffer first; cuts and damage are tested in crates/device/tests/storage",
     ),
-    row(
-        "core::num",
-        &[Index, Division, Message, Unwrap],
-        "numbers in the last words and the log, into buffers of fixed size",
-    ),
-    row("core::fmt", &[Index, Division, Message], "numbers in the last words and the log, into buffers of fixed size"),
     real(
         "synopsys_usb_otg",
         &[Index, Borrow, Message, Unwrap],
