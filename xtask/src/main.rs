@@ -61,7 +61,8 @@ cargo xtask <verb>
   docs     dead links, paths, test names and fault identifiers in any file
   package  packages for strangers: packed, unpacked outside the repository, tested there, their examples run
   mutants  wrong changes of the code that named tests must catch; cargo xtask mutants WORDS: those whose name has WORDS
-  faults [--all] [--json] [ID...]   the fault catalogue: every script of tests/faults against the simulated arm
+  faults [--all] [--json] [--shift SEED] [ID...]   the fault catalogue: every script of tests/faults against the
+           simulated arm; shifted: each scenario up to 0.12 s later, its pushes up to 7 % harder or weaker
            --device sim: | board: the scenarios marked for it, with the image under QEMU or on the emulated board
   faults storm [--wide] [--runs N] [--seed S]   random faults and orders; one run prints itself as a scenario
   faults endurance [--hours H] [--seed S]   such storms on one arm in one process, H hours of simulated time, 0.25 unless given

@@ -6,9 +6,19 @@ use std::path::{Path, PathBuf};
 use control::{Fault, State};
 use lab::procedure::Mode;
 use serde::{Deserialize, Serialize};
+use sim::Noise;
 use sim::fault::{FaultKind, Injection};
 
 use crate::figure::Figure;
+
+/// Stream of noise that shifts scenarios.
+const SHIFT_STREAM: u64 = 0x5704;
+
+/// Longest time by which a scenario is shifted, s.
+const LATEST: f64 = 0.12;
+
+/// Largest share by which a push of a shifted scenario differs from what is written.
+const HARDER: f64 = 0.07;
 
 /// An entry: the file `tests/faults/NAME.toml`.
 #[derive(Debug, Clone, Deserialize)]
@@ -83,6 +93,31 @@ impl Scenario {
     pub fn is_of_the_port(&self) -> bool {
         let is = |kind: &FaultKind| matches!(kind, FaultKind::BusOff | FaultKind::Refuse(_) | FaultKind::Clock(_));
         self.inject.iter().any(|injection| is(&injection.what))
+    }
+
+    /// The scenario up to [`LATEST`] later, its pushes up to [`HARDER`] harder or weaker: a bar that holds at the
+    /// written millisecond alone does not hold. One that begins with the power-up stays as it is: what the start-up does
+    /// comes at times of its own.
+    #[must_use]
+    pub fn shifted(&self, seed: u64) -> Self {
+        let mut shifted = self.clone();
+        if self.from == From::PowerUp {
+            return shifted;
+        }
+        let mut dice = Noise::new(
+            seed,
+            self.name.bytes().fold(SHIFT_STREAM, |all, byte| all.wrapping_mul(31).wrapping_add(u64::from(byte))),
+        );
+        let (later, share) = (dice.uniform(0.0, LATEST), dice.uniform(1.0 - HARDER, 1.0 + HARDER));
+        shifted.watch += later;
+        shifted.order.iter_mut().for_each(|order| order.at += later);
+        for injection in &mut shifted.inject {
+            injection.at += later;
+            if let FaultKind::Push { force } = &mut injection.what {
+                *force = force.map(|value| value * share);
+            }
+        }
+        shifted
     }
 
     /// The scenario for each arm of the sweep; itself where there is none.

@@ -1,4 +1,4 @@
-//! `faults [--json] [--all] [--device sim:|board:] [ID...]`: runs the fault catalogue, or some of it.
+//! `faults [--json] [--all] [--shift SEED] [--device sim:|board:] [ID...]`: runs the fault catalogue, or some of it.
 //! `faults storm [--wide] [--runs N] [--seed S]`: runs storms of random faults, the seeds in a row from S on.
 //! `faults endurance [--hours H] [--seed S]`: the same on one arm in one process, for hours of simulated time.
 
@@ -101,18 +101,25 @@ struct Wanted {
     ids: Vec<String>,
     json: bool,
     all: bool,
+    /// Every scenario is shifted by what this seed draws.
+    shift: Option<u64>,
     /// The engine of the co-controller's application.
     kind: SimulatorKind,
 }
 
 impl Wanted {
     fn parse(words: &[String]) -> Result<Self, Box<dyn std::error::Error>> {
-        let mut wanted = Self { ids: Vec::new(), json: false, all: false, kind: SimulatorKind::InProcess };
+        let kind = SimulatorKind::InProcess;
+        let mut wanted = Self { ids: Vec::new(), json: false, all: false, shift: None, kind };
         let mut words = words.iter().map(String::as_str);
         while let Some(word) = words.next() {
             match word {
                 "--json" => wanted.json = true,
                 "--all" => wanted.all = true,
+                "--shift" => {
+                    let seed = words.next().ok_or("--shift needs a seed")?;
+                    wanted.shift = Some(seed.parse().map_err(|cause| format!("--shift {seed}: {cause}"))?);
+                }
                 "--device" => {
                     wanted.kind = match words.next() {
                         Some("sil:") => SimulatorKind::InProcess,
@@ -143,9 +150,13 @@ impl Wanted {
 }
 
 fn go(wanted: &Wanted) -> Result<bool, Box<dyn std::error::Error>> {
-    let &Wanted { ref ids, json, all, kind } = wanted;
-    let entries = Entry::all(Path::new(FOLDER))?;
+    let &Wanted { ref ids, json, all, shift, kind } = wanted;
+    let mut entries = Entry::all(Path::new(FOLDER))?;
     let differences = catalogue::differences(&entries, &std::fs::read_to_string(CATALOGUE)?);
+    if let Some(seed) = shift {
+        let scenarios = entries.iter_mut().flat_map(|entry| &mut entry.scenario);
+        scenarios.for_each(|scenario| *scenario = scenario.shifted(seed));
+    }
     if let Some(id) = ids.iter().find(|id| entries.iter().all(|entry| entry.id != **id)) {
         return Err(format!("there is no entry {id}").into());
     }

@@ -6,6 +6,7 @@ use faults::catalogue::differences;
 use faults::entry::Entry;
 use faults::run::run;
 use lab::transport::SimulatorKind;
+use sim::fault::FaultKind;
 
 /// An entry with one scenario: torque frames cannot leave.
 const SCRIPT: &str = r#"title = "torque frames cannot leave"
@@ -98,4 +99,29 @@ fn a_sweep_is_as_good_as_the_worst_of_its_arms() {
     let refused = |to: &str| read(&text.replace("{ count = 2, by = 0.2 }", to)).expect_err("it means nothing");
     assert!(refused("{ count = 0, by = 0.2 }").contains("a sweep of no arms"));
     assert!(refused("{ count = 2, by = 0 }").contains("of no time"));
+}
+
+#[test]
+fn a_shifted_scenario_is_later_as_a_whole_and_pushes_a_little_differently() {
+    let text = SCRIPT.replace(
+        "inject = [",
+        "order = [{ at = 0.3, give = \"stop\" }]\ninject = [{ at = 0.2, what.push.force = [10.0, 0.0, -20.0] }, ",
+    );
+    let entry = read(&text).expect("sound");
+    let [scenario] = entry.scenario.as_slice() else { panic!("one scenario") };
+    let shifted = scenario.shifted(1);
+    let later = shifted.watch - scenario.watch;
+    assert!(later > 0.0 && later < 0.12, "{later} s");
+    for (new, old) in shifted.inject.iter().zip(&scenario.inject) {
+        assert!((new.at - old.at - later).abs() < 1e-12);
+    }
+    assert!((shifted.order[0].at - scenario.order[0].at - later).abs() < 1e-12);
+    let FaultKind::Push { force: [x, y, z] } = shifted.inject[0].what else { panic!("a push") };
+    assert!(x != 10.0 && (x / 10.0 - 1.0).abs() < 0.07 && y == 0.0 && (z + 2.0 * x).abs() < 1e-12, "{x}, {y}, {z} N");
+
+    let again = |seed| scenario.shifted(seed).watch;
+    assert_eq!(again(1), shifted.watch, "the seed alone decides");
+    assert_ne!(again(2), shifted.watch);
+    let [power_up] = read(&SCRIPT.replace("hold", "power-up")).expect("sound").scenario.try_into().expect("one");
+    assert_eq!(power_up.shifted(1).watch, power_up.watch, "the start-up has times of its own");
 }
