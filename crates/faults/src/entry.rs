@@ -96,8 +96,8 @@ impl Scenario {
     }
 
     /// The scenario up to [`LATEST`] later, its pushes up to [`HARDER`] harder or weaker: a bar that holds at the
-    /// written millisecond alone does not hold. One that begins with the power-up stays as it is: what the start-up does
-    /// comes at times of its own.
+    /// written millisecond alone does not hold. One that begins with the power-up stays as it is: its start-up has
+    /// times of its own.
     #[must_use]
     pub fn shifted(&self, seed: u64) -> Self {
         let mut shifted = self.clone();
