@@ -16,6 +16,9 @@ const RENEWAL: u8 = few_periods(0.027);
 /// Parts of a renewal, a control period each: the wrist's joints, the other ones, the factor.
 const PARTS: u8 = 3;
 
+/// Times that a renewal can be postponed: twice its parts, so that no two or three orders in a row are in its way.
+const POSTPONED: u8 = 2 * PARTS;
+
 /// First joint (from 0) of the first part.
 const WRIST: usize = 5;
 
@@ -29,6 +32,8 @@ pub(crate) struct Mass<R: Real> {
     gathered: Composite<R>,
     /// Control periods since the renewal began.
     cycle: u8,
+    /// Times that this renewal was postponed.
+    postponed: u8,
     ready: bool,
 }
 
@@ -40,6 +45,7 @@ impl<R: Real> Mass<R> {
             factor: SMatrix::zeros(),
             gathered: Composite::nothing(),
             cycle: 0,
+            postponed: 0,
             ready: false,
         }
     }
@@ -63,7 +69,10 @@ impl<R: Real> Mass<R> {
                 model.gather(frames, &mut self.gathered, WRIST..JOINTS, &mut self.matrix);
             }
             1 => model.gather(frames, &mut self.gathered, 0..WRIST, &mut self.matrix),
-            2 => self.factorise(),
+            2 => {
+                self.factorise();
+                self.postponed = 0;
+            }
             _ => {}
         }
         self.cycle = (self.cycle + 1) % RENEWAL;
@@ -79,10 +88,12 @@ impl<R: Real> Mass<R> {
     }
 
     /// This control period has a change of state to compute: a renewal that is due, or under way, begins in the next
-    /// one. Without this the longest cycle of a run depends on the moment at which a person begins it.
+    /// one. Without this the longest cycle of a run depends on the moment at which a person begins it. A host that
+    /// changes the state again and again does not hold it up for longer than [`POSTPONED`] times.
     pub(crate) fn postpone(&mut self) {
-        if self.ready && self.cycle < PARTS {
+        if self.ready && self.cycle < PARTS && self.postponed < POSTPONED {
             self.cycle = RENEWAL - 1;
+            self.postponed += 1;
         }
     }
 
@@ -207,6 +218,24 @@ mod tests {
             let (leisure, known) = (mass.leaves(), mass.matrix);
             mass.renew(&model, &frames);
             assert!(mass.matrix == known || leisure == Leisure::None, "cycle {cycle}");
+        }
+    }
+
+    /// The change that makes it fail: a renewal can be postponed without end.
+    #[test]
+    fn orders_without_end_do_not_hold_up_the_renewal() {
+        let model = ArmModel::<f64>::new(Payload::SensorAndHand);
+        let [before, now] = [[0.0; JOINTS], POSTURE].map(|q| Frames::new(&model, &JointPositions::from_array(q)));
+        for every in 1..=4 {
+            let mut mass = Mass::new();
+            mass.renew(&model, &before);
+            for cycle in 0..6 * u32::from(RENEWAL) {
+                if cycle % every == 0 {
+                    mass.postpone();
+                }
+                mass.renew(&model, &now);
+            }
+            assert_eq!(mass.matrix, model.mass_matrix(&now), "an order every {every} cycles");
         }
     }
 
