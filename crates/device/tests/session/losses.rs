@@ -1,6 +1,6 @@
 //! Which images the store has lost, as a host is told.
 
-use device::storage::{Library, Opening};
+use device::storage::{Library, Opening, Work};
 use link::{Name, Refusal, Reply, Request, RunOptions};
 
 use crate::rig::{Rig, SLOT_BYTES, SLOTS, image};
@@ -64,4 +64,23 @@ fn h11_of_two_images_of_one_name_the_one_is_believed_whose_place_has_lost_nothin
     rig.session.store_mut().settle(Ok(()));
     rig.poll();
     assert_eq!(rig.names(), Vec::<String>::new());
+}
+
+/// The change that makes it fail: the first free place is taken, and nobody is told any more what was lost there.
+#[test]
+fn h11_an_image_of_a_new_name_takes_the_place_of_a_lost_one_only_where_there_is_no_other() {
+    let mut damaged = image("reach", 3.0, 10);
+    damaged[500] ^= 4;
+    let mut rig = restored(&[damaged, image("push", 3.0, 10)]);
+    for (name, slot) in [("grasp", 2), ("last", 0)] {
+        rig.send_parts(name, &image(name, 3.0, 10));
+        assert_eq!(rig.ask(Request::UploadCommit), None);
+        let work = rig.session.store_mut().take(&mut [0; SLOT_BYTES]);
+        assert!(matches!(work, Some(Work::Save { slot: place, .. }) if place == slot), "{work:?}");
+        rig.session.store_mut().settle(Ok(()));
+        rig.poll();
+        let missed = if slot == 0 { (None, 0) } else { (Some(Some("reach".to_owned())), 1) };
+        assert_eq!(loss(&mut rig, 0), missed, "{name}");
+    }
+    assert_eq!(rig.names(), ["last", "push", "grasp"]);
 }

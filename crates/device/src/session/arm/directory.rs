@@ -106,9 +106,12 @@ impl Directory {
         (0..self.places).find_map(|slot| self.get(slot).filter(|entry| entry.name == *name).map(|entry| (slot, entry)))
     }
 
-    /// A place to put an image of a new name: a free one. Its store may still hold an unsound image there.
-    pub(crate) fn free(&self) -> Option<u8> {
-        (0..self.places).find(|slot| self.get(*slot).is_none())
+    /// A place to put an image of a new name: a free one. One that has lost an image comes last: with another one there
+    /// nobody would be told any more. Its store may still hold an unsound image there.
+    pub(crate) fn free(&self, store: &impl Store) -> Option<u8> {
+        let mut free = (0..self.places).filter(|slot| self.get(*slot).is_none());
+        let first = free.clone().next();
+        free.find(|slot| store.image(*slot).is_none() && store.report(*slot).loss.is_none()).or(first)
     }
 
     /// Adds to what the store reports about a place: an image that the store could read and that is not sound is lost,

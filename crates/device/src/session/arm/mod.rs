@@ -219,7 +219,7 @@ impl<S: Store> ArmApplication<S> {
         Change::note_building(&mut self.saving);
         primitive::build(&self.model, image.content(), &mut self.weights, &mut self.primitive)?;
         let entry = Entry::of(&image);
-        let place = self.directory.find(&entry.name).map(|(slot, _)| slot).or_else(|| self.directory.free());
+        let place = self.directory.find(&entry.name).map(|(slot, _)| slot).or_else(|| self.directory.free(&self.store));
         let Some(slot) = place else {
             return Err((Refusal::StoreFull, [self.directory.places().into(), 0]));
         };
@@ -270,7 +270,7 @@ impl<S: Store> Application for ArmApplication<S> {
 
     fn begin(&mut self, name: &Name, length: u32) -> Result<(), Refused> {
         // Better refused now than after all of it has been sent.
-        if self.directory.find(name).is_none() && self.directory.free().is_none() {
+        if self.directory.find(name).is_none() && self.directory.free(&self.store).is_none() {
             return Err((Refusal::StoreFull, [self.directory.places().into(), 0]));
         }
         Ok(self.store.begin(usize::try_from(length).unwrap_or(usize::MAX))?)
