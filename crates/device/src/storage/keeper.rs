@@ -11,7 +11,7 @@ use super::journaled::{Found, JournaledError, JournaledFlash};
 use super::library::Work;
 use super::pause::pause;
 use super::survey::{PLACES, SETTINGS, Survey};
-use super::{HOME_KEY, Opening, SECRET_KEY, WEIGHT_KEY};
+use super::{HOME_KEY, Opening};
 use crate::calibration::StoredHome;
 use crate::store::StoreError;
 
@@ -219,7 +219,7 @@ async fn read_all<F: NorFlash, D: LibraryAccess>(
             home = StoredHome::read(image);
             continue;
         }
-        let group = holding.get_mut(usize::from(slot / 32)).filter(|_| !matches!(slot, WEIGHT_KEY | SECRET_KEY));
+        let group = holding.get_mut(usize::from(slot / 32)).filter(|_| slot < HOME_KEY);
         if let Some(group) = group {
             let bit = 1 << (slot % 32);
             *group = if image.is_empty() { *group & !bit } else { *group | bit };

@@ -1,9 +1,10 @@
 //! The library in memory, and what is to be done about it on the flash.
 
 use control::model::WeightCorrection;
-use link::image::{NAMED_HEAD_BYTES, legible_name};
+use link::image::legible_name;
 use link::{LostImage, Secret, StorageReport};
 
+use super::loss::{Loss, Subject, end_of};
 use super::survey::SETTINGS;
 use crate::calibration::{HOME_BYTES, Home, StoredHome};
 use crate::secret::StoredSecret;
@@ -46,18 +47,6 @@ impl Work {
     }
 }
 
-/// Remains of a lost image; all zeros where none is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Loss {
-    is_lost: bool,
-    /// The first bytes of the image, as far as they are known.
-    head: [u8; NAMED_HEAD_BYTES],
-}
-
-impl Loss {
-    const NONE: Self = Self { is_lost: false, head: [0; NAMED_HEAD_BYTES] };
-}
-
 /// Progress of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Job {
@@ -85,6 +74,11 @@ pub struct Library<const SLOTS: usize, const BYTES: usize> {
     is_open: bool,
     opening: Opening,
     losses: [Loss; SLOTS],
+    setting_losses: [Loss; SETTINGS.len()],
+    /// The note about a loss that the keeper writes or deletes, and whether the loss was there as it began.
+    noting: Option<(Subject, bool)>,
+    /// The flash has taken no note in this start.
+    refuses_notes: bool,
 }
 
 impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
@@ -102,6 +96,9 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
             is_open: false,
             opening: Opening::NOTHING,
             losses: [Loss::NONE; SLOTS],
+            setting_losses: [Loss::NONE; SETTINGS.len()],
+            noting: None,
+            refuses_notes: false,
         }
     }
 
@@ -111,8 +108,12 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         self.is_open.then_some(self.opening)
     }
 
-    /// The keeper found an image, the weight or the secret.
+    /// The keeper found an image, the weight, the secret or the note about a loss.
     pub fn restore(&mut self, slot: u8, image: &[u8]) {
+        if let Some(subject) = Subject::of_note(slot) {
+            self.loss_mut(subject).into_iter().for_each(|loss| loss.read(image));
+            return;
+        }
         match slot {
             WEIGHT_KEY => return self.weight = StoredWeight::read(image),
             SECRET_KEY => return self.secret = StoredSecret::read(image),
@@ -126,8 +127,12 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         let _ = self.memory.finished();
     }
 
-    /// The keeper found an image, the weight or the secret, and it was deleted later.
+    /// The keeper found an image, the weight, the secret or a note, and it was deleted later.
     pub fn forget(&mut self, slot: u8) {
+        if let Some(subject) = Subject::of_note(slot) {
+            self.loss_mut(subject).into_iter().for_each(|loss| loss.read(&[]));
+            return;
+        }
         match slot {
             WEIGHT_KEY => return self.weight = StoredWeight::Nothing,
             SECRET_KEY => return self.secret = StoredSecret::Nothing,
@@ -152,10 +157,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
 
     /// The keeper found that the newest image of a place cannot be read; these are its first bytes.
     pub fn lose(&mut self, slot: u8, head: &[u8]) {
-        if let Some(loss) = self.losses.get_mut(usize::from(slot)) {
-            loss.is_lost = true;
-            loss.head.iter_mut().zip(head).for_each(|(place, byte)| *place = *byte);
-        }
+        self.loss_mut(Subject::Place(slot)).into_iter().for_each(|loss| loss.find(head));
     }
 
     /// The keeper found everything there was.
@@ -164,15 +166,72 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
             (0..self.memory.slots()).for_each(|slot| self.forget(slot));
             self.weight = StoredWeight::Nothing;
             self.secret = StoredSecret::Nothing;
+            // What was read of notes is gone with the rest.
+            self.losses.fill(Loss::NONE);
+            self.setting_losses.fill(Loss::NONE);
         }
         self.home = opening.home;
         self.opening = Opening { weight: self.weight.source(), secret: self.secret.state(), ..opening };
+        self.judge_losses();
         self.is_open = true;
     }
 
-    /// Hands a change to the keeper, with a copy of what is to be saved.
+    /// Compares the notes about losses with what was read.
+    fn judge_losses(&mut self) {
+        for subject in self.subjects() {
+            let standing = self.standing(subject);
+            let is_found =
+                matches!(subject, Subject::Setting(number) if self.opening.settings_lost & (1 << number) != 0);
+            let Some(loss) = self.loss_mut(subject) else { continue };
+            loss.judge(standing);
+            if let Subject::Setting(number) = subject {
+                loss.is_lost |= is_found;
+                self.opening.settings_lost |= u8::from(loss.is_lost) << number;
+            }
+        }
+    }
+
+    /// Everything that may be lost.
+    fn subjects(&self) -> impl Iterator<Item = Subject> + use<SLOTS, BYTES> {
+        (0..self.memory.slots()).map(Subject::Place).chain([0, 1, 2].map(Subject::Setting))
+    }
+
+    fn loss_mut(&mut self, subject: Subject) -> Option<&mut Loss> {
+        match subject {
+            Subject::Place(place) => self.losses.get_mut(usize::from(place)),
+            Subject::Setting(setting) => self.setting_losses.get_mut(usize::from(setting)),
+        }
+    }
+
+    /// The end of the value that counts; 1 for one that stands and cannot be used.
+    fn standing(&self, subject: Subject) -> u32 {
+        let key = match subject {
+            Subject::Place(place) => return end_of(self.memory.image(place).unwrap_or_default()),
+            Subject::Setting(setting) => SETTINGS.get(usize::from(setting)).copied(),
+        };
+        match key {
+            Some(HOME_KEY) => match self.home {
+                StoredHome::Nothing => 0,
+                StoredHome::Kept(home) => end_of(&home.encode()),
+                StoredHome::Damaged | StoredHome::Foreign => 1,
+            },
+            Some(WEIGHT_KEY) => match &self.weight {
+                StoredWeight::Nothing => 0,
+                StoredWeight::Kept(weight) => end_of(&crate::weight::encode(weight)),
+                StoredWeight::Damaged | StoredWeight::Foreign => 1,
+            },
+            _ => match &self.secret {
+                StoredSecret::Nothing => 0,
+                StoredSecret::Kept(secret) => end_of(&crate::secret::encode(secret)),
+                StoredSecret::Unreadable => 1,
+            },
+        }
+    }
+
+    /// Hands a change to the keeper, with a copy of what is to be saved; where nobody asks for one, a note about a
+    /// loss.
     pub fn take(&mut self, image: &mut [u8]) -> Option<Work> {
-        let Job::Asked(work) = self.job else { return None };
+        let Job::Asked(work) = self.job else { return self.take_note(image) };
         if let Work::Save { length, .. } = work {
             let staged = if work.is_of_setting() { self.staged.get(..length) } else { self.memory.staged() };
             let pair = staged.zip(image.get_mut(..length)).filter(|(from, to)| from.len() == to.len());
@@ -186,8 +245,33 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         Some(work)
     }
 
+    /// Hands the keeper the next note that the flash has and should not have, or the other way round.
+    fn take_note(&mut self, room: &mut [u8]) -> Option<Work> {
+        if !self.is_open || self.refuses_notes {
+            return None;
+        }
+        let subject = self.subjects().find(|subject| self.loss_mut(*subject).is_some_and(|loss| loss.wants_note()))?;
+        let standing = self.standing(subject);
+        let note = self.loss_mut(subject)?.note(standing);
+        self.noting = Some((subject, note.is_some()));
+        let slot = subject.note_key();
+        let Some(note) = note else { return Some(Work::Delete { slot }) };
+        room.iter_mut().zip(note).for_each(|(place, byte)| *place = byte);
+        Some(Work::Save { slot, length: note.len() })
+    }
+
     /// The keeper is done with the change: it is durable, or the flash is as before.
     pub fn settle(&mut self, outcome: Result<(), StoreError>) {
+        if let Some((subject, is_noted)) = self.noting.take() {
+            match outcome {
+                Ok(()) => self.loss_mut(subject).into_iter().for_each(|loss| loss.set_noted(is_noted)),
+                Err(error) => {
+                    self.refuses_notes = true;
+                    self.fail(error);
+                }
+            }
+            return;
+        }
         let Job::Begun(work) = self.job else { return };
         let outcome = match work {
             Work::Save { slot: HOME_KEY, length } => {
@@ -229,13 +313,10 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
     /// Another value stands there now: nobody misses the lost one.
     fn make_good(&mut self, work: Work) {
         let (Work::Save { slot, .. } | Work::Delete { slot }) = work;
-        match SETTINGS.iter().position(|setting| *setting == slot) {
-            Some(place) => self.opening.settings_lost &= !(1 << place),
-            None => {
-                if let Some(loss) = self.losses.get_mut(usize::from(slot)) {
-                    *loss = Loss::NONE;
-                }
-            }
+        let subject = Subject::of_value(slot);
+        self.loss_mut(subject).into_iter().for_each(Loss::make_good);
+        if let Subject::Setting(number) = subject {
+            self.opening.settings_lost &= !(1 << number);
         }
     }
 

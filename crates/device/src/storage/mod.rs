@@ -17,11 +17,13 @@ mod journal;
 mod journaled;
 mod keeper;
 mod library;
+mod loss;
 mod pause;
 mod survey;
 
 pub use keeper::{LibraryAccess, Scratch, keep, value_bytes};
-pub use library::{Library, Loss, Work};
+pub use library::{Library, Work};
+pub use loss::Loss;
 
 use core::fmt;
 

@@ -117,6 +117,105 @@ fn h11_an_upload_that_power_failed_in_is_told_as_no_loss() {
     }
 }
 
+/// Where the last value lies that begins in this way.
+fn found(content: &[u8], beginning: &[u8]) -> usize {
+    let mut words = (0..content.len()).step_by(WORD_BYTES).rev();
+    words.find(|word| content[*word..].starts_with(beginning)).expect("it is on the flash")
+}
+
+/// The library with the newest images of places 1 and 2 damaged, and the home.
+fn damaged() -> Vec<u8> {
+    let mut content = library();
+    for slot in 1..3 {
+        let at = found(&content, &[&[slot], &named(slot + 1)[..60]].concat());
+        content[at + 3000] ^= 1;
+    }
+    let at = found(&content, b"\xC0TacH");
+    content[at + 20] ^= 1;
+    content
+}
+
+/// The change that makes it fail: a loss is known by what lies on the flash alone, of which the sector of the damaged
+/// value is erased one day, or the one with the image of before is copied behind it.
+#[test]
+fn h11_a_loss_is_told_for_as_long_as_nobody_has_made_it_good_however_much_is_stored_meanwhile() {
+    let chip = chip(&damaged());
+    for uploads in [0, 9, 60, 60, 60, 0] {
+        let wishes: Vec<Wish> = (0..uploads).map(|number| Wish::Named(3, 10 + number)).collect();
+        let (shared, answers) = run_on::<4>(&chip, &wishes);
+        assert!(answers.iter().all(|answer| *answer == Some(Ok(()))), "{answers:?}");
+        let library = shared.library();
+        // Of the first one an image of before stands there.
+        assert_eq!((library.image(1), library.image(2)), (Some(named(9).as_slice()), None));
+        let losses = [1, 2].map(|slot| library.report(slot).loss.expect("a loss"));
+        assert_eq!(losses.each_ref().map(|loss| loss.older), [true, false], "{uploads} uploads");
+        let names = losses.map(|loss| loss.name.expect("a name").as_str().to_owned());
+        assert_eq!(names, ["image-2", "image-3"], "{uploads} uploads");
+        assert_eq!((library.report(0).lost, library.report(0).settings_lost), (2, 1), "{uploads} uploads");
+    }
+    // What was stored again is missed no more, be it the image of before itself.
+    run_on::<4>(&chip, &[Wish::Named(1, 9), Wish::Named(2, 3), Wish::Home(5)]);
+    let (shared, _) = run_on::<4>(&chip, &[]);
+    assert_eq!(shared.library().report(1), link::StorageReport::default());
+}
+
+/// The change that makes it fail: as above; the deleted image would be like any other after two rounds of the log.
+#[test]
+fn h11_a_deleted_image_that_damage_brings_back_is_told_as_such_for_as_long_as_it_is_there() {
+    let mut content = {
+        let chip = chip(&library());
+        run_on::<4>(&chip, &[Wish::Delete(0)]);
+        chip.lock().content().to_vec()
+    };
+    // The deletion is the last value: a header, and a word with the key.
+    let is_used = |word: &usize| content[*word..word + WORD_BYTES] != [0xFF; WORD_BYTES];
+    let key = (0..SECTOR_BYTES - WORD_BYTES).step_by(WORD_BYTES).rev().find(is_used).expect("it is there");
+    content[key - WORD_BYTES] ^= 1;
+    let chip = chip(&content);
+    for uploads in [0, 60, 60, 0] {
+        let wishes: Vec<Wish> = (0..uploads).map(|number| Wish::Named(3, 10 + number)).collect();
+        let (shared, _) = run_on::<4>(&chip, &wishes);
+        let library = shared.library();
+        assert_eq!(library.image(0), Some(named(1).as_slice()));
+        assert!(library.report(0).loss.is_some_and(|loss| loss.older && loss.name.is_none()), "{uploads} uploads");
+    }
+    // Deleted once more it is gone, and nothing is missed.
+    run_on::<4>(&chip, &[Wish::Delete(0)]);
+    let (shared, _) = run_on::<4>(&chip, &[]);
+    let library = shared.library();
+    assert_eq!((library.image(0), library.report(0).loss), (None, None));
+}
+
+/// The change that makes it fail: a note counts whatever stands there by now.
+#[test]
+fn h11_an_upload_that_makes_a_loss_good_is_told_as_no_loss_wherever_power_fails_behind_it() {
+    let noted = {
+        let chip = chip(&damaged());
+        run_on::<4>(&chip, &[]);
+        chip.lock().content().to_vec()
+    };
+    let upload = [Wish::Named(2, 7)];
+    let operations = {
+        let chip = chip(&noted);
+        run_on::<4>(&chip, &upload);
+        chip.lock().operations()
+    };
+    let (mut before, mut behind) = (0, 0);
+    for operation in operations.saturating_sub(12)..operations {
+        let chip = chip(&noted);
+        chip.lock().cut_power_at(operation, operation);
+        run_on::<4>(&chip, &upload);
+        chip.lock().restart();
+        let (shared, _) = run_on::<4>(&chip, &[]);
+        let library = shared.library();
+        let is_there = library.image(2) == Some(named(7).as_slice());
+        assert_eq!(library.report(2).loss.is_some(), !is_there, "cut {operation} of {operations}");
+        assert!(library.report(1).loss.is_some(), "the other one is missed all the same");
+        *(if is_there { &mut behind } else { &mut before }) += 1;
+    }
+    assert!(before > 2 && behind > 1, "{before} and {behind}");
+}
+
 /// A chip of which one sector cannot be erased, or only after so many tries.
 struct Worn {
     port: FlashPort,
