@@ -1,5 +1,7 @@
 //! The library in memory, and what is to be done about it on the flash.
 
+use core::mem;
+
 use control::model::WeightCorrection;
 use link::image::legible_name;
 use link::{LostImage, Secret, StorageReport};
@@ -47,6 +49,17 @@ impl Work {
     }
 }
 
+/// The note that the keeper is at. An empty library is all zeros, which `None` of an `Option` need not be: a board would
+/// keep all of its memory, for images as well, a second time in its flash.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+enum Noting {
+    /// None.
+    Nothing,
+    /// The one about this, and whether it was lost as the keeper began.
+    Begun(Subject, bool),
+}
+
 /// Progress of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Job {
@@ -75,8 +88,7 @@ pub struct Library<const SLOTS: usize, const BYTES: usize> {
     opening: Opening,
     losses: [Loss; SLOTS],
     setting_losses: [Loss; SETTINGS.len()],
-    /// The note about a loss that the keeper writes or deletes, and whether the loss was there as it began.
-    noting: Option<(Subject, bool)>,
+    noting: Noting,
     /// The flash has taken no note in this start.
     refuses_notes: bool,
 }
@@ -97,7 +109,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
             opening: Opening::NOTHING,
             losses: [Loss::NONE; SLOTS],
             setting_losses: [Loss::NONE; SETTINGS.len()],
-            noting: None,
+            noting: Noting::Nothing,
             refuses_notes: false,
         }
     }
@@ -253,7 +265,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
         let subject = self.subjects().find(|subject| self.loss_mut(*subject).is_some_and(|loss| loss.wants_note()))?;
         let standing = self.standing(subject);
         let note = self.loss_mut(subject)?.note(standing);
-        self.noting = Some((subject, note.is_some()));
+        self.noting = Noting::Begun(subject, note.is_some());
         let slot = subject.note_key();
         let Some(note) = note else { return Some(Work::Delete { slot }) };
         room.iter_mut().zip(note).for_each(|(place, byte)| *place = byte);
@@ -262,7 +274,7 @@ impl<const SLOTS: usize, const BYTES: usize> Library<SLOTS, BYTES> {
 
     /// The keeper is done with the change: it is durable, or the flash is as before.
     pub fn settle(&mut self, outcome: Result<(), StoreError>) {
-        if let Some((subject, is_noted)) = self.noting.take() {
+        if let Noting::Begun(subject, is_noted) = mem::replace(&mut self.noting, Noting::Nothing) {
             match outcome {
                 Ok(()) => self.loss_mut(subject).into_iter().for_each(|loss| loss.set_noted(is_noted)),
                 Err(error) => {
