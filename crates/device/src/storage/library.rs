@@ -49,8 +49,8 @@ impl Work {
     }
 }
 
-/// The note that the keeper is at. An empty library is all zeros, which `None` of an `Option` need not be: a board would
-/// keep all of its memory, for images as well, a second time in its flash.
+/// The note that the keeper is at. An empty library is all zeros, which `None` of an `Option` need not be: a board
+/// would keep all of its memory, for images as well, a second time in its flash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 enum Noting {
