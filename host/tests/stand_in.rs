@@ -247,6 +247,9 @@ fn a_program_that_was_suspended_in_a_move_says_so_and_waits_for_nothing() {
     let signal = |name: &str| Command::new("kill").args([name, &teach.id().to_string()]).status().unwrap().success();
     assert!(signal("-STOP"));
     until(at, &["soft stop"]);
+    // Whoever comes now learns why the arm stands.
+    let status: Value = serde_json::from_slice(&tactus(at, "status").stdout).unwrap();
+    assert_eq!((&status["fault"], &status["silences"]), (&0.into(), &1.into()), "{status}");
     assert!(signal("-CONT"));
     let begun = std::time::Instant::now();
     let output = teach.wait_with_output().unwrap();

@@ -50,6 +50,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Err(error) => return Err(error.into_failure(DOING)),
     };
     let storage = storage::ask(&mut client).map_err(|error| error.into_failure(DOING))?;
+    let silences = client.statistics().map_err(|error| error.into_failure(DOING))?.link_timeouts;
     let line = command.line.map(|time| line_health::measure(&mut client, time)).transpose();
     let line = line.map_err(|error| error.into_failure(DOING))?;
     let hello = client.hello();
@@ -58,7 +59,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let fault = Fault::from_code(status.fault).filter(|fault| *fault != Fault::None);
     let stage = Stage::from_code(status.startup_stage).map_or("unknown", Stage::explanation);
     let state = State::from_code(status.state).map_or("unknown", State::name);
-    let text = text(&status, &board, stage, state, fault, (source, weight.as_deref()))
+    let text = text(&status, &board, stage, state, (fault, silences), (source, weight.as_deref()))
         + &condition(storage.as_ref())
         + &words(line.as_ref());
     let data = StatusReport {
@@ -73,6 +74,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         help: status.blocked.and_then(blocked_remedy),
         state,
         fault: status.fault,
+        silences,
         zeroed: status.zeroed,
         home: source.map(HomeSource::name),
         weight,
@@ -113,6 +115,8 @@ pub struct StatusReport {
     pub state: &'static str,
     /// Code of the latched fault, 0 for none.
     pub fault: u8,
+    /// Motions since start-up that the device stopped because their host fell silent.
+    pub silences: u32,
     /// The encoders count from a known pose.
     pub zeroed: bool,
     /// Whose home counts; null where that is not known yet, and for a hand alone.
@@ -142,7 +146,7 @@ fn text(
     board: &str,
     stage: &str,
     state: &str,
-    fault: Option<Fault>,
+    (fault, silences): (Option<Fault>, u32),
     (source, weight): (Option<HomeSource>, Option<&str>),
 ) -> String {
     let blocked = status.blocked.map(|numbers| format!(": {}", explain_blocked(numbers))).unwrap_or_default();
@@ -151,9 +155,12 @@ fn text(
     if let Some(remedy) = status.blocked.and_then(blocked_remedy) {
         table.row(["help", remedy]);
     }
+    table.row(["state", state]).row(["fault", &fault.map_or_else(|| "none".to_owned(), |fault| fault.to_string())]);
+    // No fault tells of such a stop, and whoever could have heard of it was gone.
+    if silences > 0 {
+        table.row(["stopped, its host silent", &format!("{silences} since the device started")]);
+    }
     table
-        .row(["state", state])
-        .row(["fault", &fault.map_or_else(|| "none".to_owned(), |fault| fault.to_string())])
         .row(["safety module", safety_mode(status.safety_mode)])
         .row(["joint angles", if status.zeroed { "count from home" } else { "not zeroed" }])
         .row(["home", source.map_or("not known", HomeSource::name)])
