@@ -113,6 +113,8 @@ const ELSEWHERE: &[(&str, &str)] = &[
     ("control::cycle::Cycle<R,_>::not_sent", "the bus has refused a frame"),
     ("device::controller::orders", "once, when a person commands"),
     ("device::controller::anew", "after a fault of the bus"),
+    ("device::controller::DeviceController::brakes_first", "torque has ended"),
+    ("device::controller::DeviceController::tell_to_brake", "torque has ended"),
     ("device::startup", "a person zeroes the arm again"),
     ("device::hand", "the hand is initialised or has failed"),
     ("firmware::board::panic_stop", "the end"),

@@ -124,12 +124,16 @@ fn bars(inject: &[Injection]) -> std::collections::BTreeMap<Figure, f64> {
         FaultKind::Delay { .. } | FaultKind::Refuse(_) | FaultKind::BusOff => true,
         _ => false,
     };
+    // An emergency stop takes the power of the pucks, and with it their angles; only the safety module can tell so.
+    let cuts_power = |fault: &Injection| matches!(fault.what, FaultKind::Pendant(PendantAction::PressEStop));
+    let is_deaf = inject.iter().any(deafens);
+    let is_blind = inject.iter().any(blinds) || (is_deaf && inject.iter().any(cuts_power));
     let bar = |is_free: bool, bar: f64| if is_free { f64::INFINITY } else { bar };
     [
-        (Figure::Belief, bar(inject.iter().any(blinds), 20.0)),
+        (Figure::Belief, bar(is_blind, 20.0)),
         (Figure::FreeSpeed, f64::INFINITY),
         (Figure::FallSpeed, 0.25),
-        (Figure::TorqueUnasked, bar(inject.iter().any(deafens), 0.0)),
+        (Figure::TorqueUnasked, bar(is_deaf, 0.0)),
         (Figure::TorqueUnheard, 0.0),
     ]
     .into()

@@ -9,9 +9,12 @@ const REQUEST_SLOTS: u16 = periods(0.02);
 /// Time for which puck 1 is asked in every second cycle if it brakes, after the safety module has said so: 0.5 s, in
 /// slow slots.
 const LOOK_SLOTS: u16 = periods(0.5);
-/// Cycles with two words to the pucks after torque has ended: 100 ms. No longer, because a bus without room has to
-/// carry positions again.
-const SECOND_WORDS: u16 = periods(0.1);
+/// Cycles with a word to the pucks in every slot after torque has ended: 100 ms. No longer, because a bus without
+/// room has to carry positions again.
+const URGENT_CYCLES: u16 = periods(0.1);
+/// Of so many of these cycles one has zero torques. A puck that is told zero and misses the words lets the arm fall;
+/// one that brakes needs no zero.
+const ZEROS_EVERY: u16 = 4;
 
 /// Answers in a row of a braking puck under an ACTIVE safety module that mean IDLE: one may be older than the
 /// activation.
@@ -31,8 +34,8 @@ pub(super) struct Brakes {
     braked: bool,
     /// A puck (0..=6), and how many times in a row it told of its brakes under an ACTIVE safety module.
     suspect: (usize, u8),
-    /// Words left for the request slots.
-    second_words: u16,
+    /// Urgent cycles left.
+    urgent: u16,
 }
 
 impl Brakes {
@@ -40,7 +43,8 @@ impl Brakes {
     pub(super) fn want(&mut self, wanted: bool) {
         if wanted && !self.wanted {
             self.braked = false;
-            self.second_words = SECOND_WORDS;
+            self.urgent = URGENT_CYCLES;
+            self.look_slots = LOOK_SLOTS;
         }
         self.wanted = wanted;
     }
@@ -109,11 +113,16 @@ impl Brakes {
         due.then(brake_frame)
     }
 
-    /// The word to the pucks for the request slot: the torque of a puck ends with the first zero torque that reaches
-    /// it, so at least as many words to brake have to leave.
-    pub(super) fn second_word(&mut self) -> Option<CanFrame> {
-        self.second_words = self.second_words.checked_sub(1)?;
-        self.is_open().then(brake_frame)
+    /// A control slot after the end of the torque: true if its zero torques are to leave.
+    pub(super) fn begin_cycle(&mut self) -> bool {
+        let Some(left) = self.urgent.checked_sub(1).filter(|_| self.is_open()) else { return true };
+        self.urgent = left;
+        (URGENT_CYCLES - 1 - left).is_multiple_of(ZEROS_EVERY)
+    }
+
+    /// The word to the pucks for a request or a control slot.
+    pub(super) fn urgent_frame(&self) -> Option<CanFrame> {
+        (self.urgent > 0 && self.is_open()).then(brake_frame)
     }
 
     /// True from the end of the torque on until puck 1 has told that it brakes, at most for the time of the looks.

@@ -282,13 +282,22 @@ impl DeviceController {
         }
     }
 
-    /// The word to brake of a request slot.
+    /// One more word to brake, in a request slot or before zero torques.
     #[cold]
     #[inline(never)]
     fn tell_to_brake(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
-        if let Some(word) = self.brakes.second_word() {
+        if let Some(word) = self.brakes.urgent_frame() {
             self.outlet(now_us, io).send(word);
         }
+    }
+
+    /// The word to brake before the zero torques of a cycle; true if these are to leave too.
+    #[cold]
+    #[inline(never)]
+    fn brakes_first(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) -> bool {
+        let torques_too = self.brakes.begin_cycle();
+        self.tell_to_brake(now_us, io);
+        torques_too
     }
 
     /// The slot that computes and sends torques.
@@ -322,7 +331,10 @@ impl DeviceController {
             external_fault: self.fault.take().or(self.standing_fault()),
         };
         let output = self.cycle.step(&input);
-        self.send_torques(output.actuation.frames(), now_us, io);
+        self.brakes.want(output.actuation.requests_idle());
+        if !self.brakes.is_open() || self.brakes_first(now_us, io) {
+            self.send_torques(output.actuation.frames(), now_us, io);
+        }
         // Torques first, then questions.
         let mut are_torques = true;
         for frame in self.hand.frames(output.actuation.hand_frame()) {
@@ -332,7 +344,6 @@ impl DeviceController {
             }
             are_torques = false;
         }
-        self.brakes.want(output.actuation.requests_idle());
         if self.cycle.is_zero_lost() {
             self.startup.lose_zero();
         }

@@ -38,9 +38,11 @@ const RETRY_US: u64 = 1_000_000;
 const IGNORED_AT_ZERO: i32 = 8;
 /// Velocity faults it shall ignore when polling begins: the length of its history.
 const IGNORED_AT_START: i32 = 5;
-/// Time for which a start-up after the cyclic loop repeats its stop frames, us: the first ones may have been lost.
+/// Time for which a start-up repeats its stop frames, us: the first ones may have been lost.
 const STOPPING_US: u64 = 500_000;
-/// Between two of these frames, us.
+/// Time for which they take every slot, us: an arm that neither pulls nor brakes reaches 0.25 m/s within 30 ms.
+const STOPS_ONLY_US: u64 = 100_000;
+/// Between two of these frames afterwards, us.
 const STOP_PACE_US: u64 = 3_000;
 /// Words that take its zero back from the safety module: it acknowledges none, one may be lost, and a device that is
 /// started anew believes it.
@@ -140,7 +142,7 @@ enum Next {
 #[derive(Clone, Debug)]
 pub(crate) struct Startup {
     step: Step,
-    /// Begun after the cyclic loop: an arm that may have had torque a moment ago.
+    /// The arm may have had torque a moment ago: in the cyclic loop, or from a board that has restarted.
     stopping: Option<Stopping>,
     /// Begun after the cyclic loop: counts that a person has zeroed are not to change unseen.
     continuity: Option<Continuity>,
@@ -194,7 +196,7 @@ impl Startup {
     pub(crate) fn new() -> Startup {
         Startup {
             step: Step::ZeroTorques { frame: 0 },
-            stopping: None,
+            stopping: Some(Stopping::default()),
             continuity: None,
             angles: MotorAngles::default(),
             exchange: Exchange::default(),

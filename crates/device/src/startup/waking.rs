@@ -4,7 +4,7 @@ use control::act::limit::MOTOR_COUNTS_LIMIT;
 use puck::{Group, MotorMode, Node, PropertyId, SafetyMode, Status, get, set, stop_frames};
 
 use super::survey::{DRIVE_PROPERTIES, PACKING_LIMIT, Survey};
-use super::{ENUMERATED, Next, POLL_US, STOP_PACE_US, STOPPING_US, Startup, Step, Stopping, after};
+use super::{ENUMERATED, Next, POLL_US, STOP_PACE_US, STOPPING_US, STOPS_ONLY_US, Startup, Step, Stopping, after};
 use crate::bus::{Answer, Outlet};
 use crate::stage::StartupError;
 
@@ -29,8 +29,8 @@ impl Startup {
         }
     }
 
-    /// Repeats a stop frame if one is due, for half a second after the cyclic loop: pucks keep the torque they have,
-    /// or the arm falls because nothing brakes it, and a frame can be lost. Goes on while a start-up rests that has not
+    /// Repeats a stop frame if one is due, for half a second: pucks keep the torque they have, or the arm falls because
+    /// nothing brakes it, and a frame can be lost. Goes on while a start-up rests that has not
     /// found the pucks: they may be heard again at any time, with the torque of then. Ends before a puck is woken, for
     /// then the bus has to be quiet. True if the slot is used.
     pub(super) fn repeats_stop(&mut self, outlet: &mut impl Outlet) -> bool {
@@ -45,17 +45,21 @@ impl Startup {
         };
         let now_us = outlet.now_us();
         let Some(Stopping { since_us, next_us, frame }) = &mut self.stopping else { return false };
-        let is_over = now_us > *since_us.get_or_insert(now_us) + STOPPING_US && !rests;
+        let since_us = *since_us.get_or_insert(now_us);
+        let is_over = now_us > since_us + STOPPING_US && !rests;
         if now_us < *next_us || is_over {
             return false;
         }
-        // The brakes hold whatever the torque is, so their frame goes more often.
+        // The brakes hold whatever the torque is, so their frame goes more often: as many in a second as in the cycles
+        // before.
         let [arm, wrist, brake, brake_hand] = stop_frames();
-        let order = [brake, arm, brake, wrist, brake, brake_hand];
+        let order = [
+            brake, brake, brake, brake, arm, brake, brake, brake, brake, wrist, brake, brake, brake, brake, brake_hand,
+        ];
         let sent = outlet.send(order.get(usize::from(*frame)).copied().unwrap_or(brake));
         if sent {
             *frame = (*frame + 1) % order.len() as u8;
-            *next_us = now_us + STOP_PACE_US;
+            *next_us = if now_us < since_us + STOPS_ONLY_US { now_us } else { now_us + STOP_PACE_US };
         }
         sent
     }

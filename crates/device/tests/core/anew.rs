@@ -1,7 +1,7 @@
 //! The bus is started anew after a loss: whatever torque the pucks still have ends, and no zero that is doubted is
 //! believed.
 
-use device::{Command, Controller, EventKind, Stage, StartupError};
+use device::{Command, Controller, DeviceController, EventKind, Stage, StartupError};
 use puck::{MotorMode, Node, PuckTorque, SafetyMode};
 
 use crate::double::{Bus, HOME, floating, silent_device};
@@ -18,11 +18,16 @@ fn torque_after_outage(milliseconds: u64) -> u64 {
     bus.run(&mut core, milliseconds as f64 / 1000.0);
     assert!(pulls(&bus), "nobody told the pucks anything");
     bus.deaf = false;
-    let back = bus.now_us;
-    while pulls(&bus) && bus.now_us < back + 5_000_000 {
-        bus.run_slots(&mut core, 1);
+    torque_lasts(&mut core, &mut bus)
+}
+
+/// Time for which a motor applies torque from now on, ms; looked at for 5 s.
+fn torque_lasts(core: &mut DeviceController, bus: &mut Bus) -> u64 {
+    let begin = bus.now_us;
+    while pulls(bus) && bus.now_us < begin + 5_000_000 {
+        bus.run_slots(core, 1);
     }
-    (bus.now_us - back) / 1000
+    (bus.now_us - begin) / 1000
 }
 
 /// A10: pucks keep the torque that they were sent last. A start-up that has not found the safety module rests for a
@@ -32,6 +37,22 @@ fn torque_after_outage(milliseconds: u64) -> u64 {
 fn a10_torque_ends_as_soon_as_the_bus_is_whole_again_however_long_it_was_not() {
     for milliseconds in (150..2500).step_by(50).chain([5000, 20_000]) {
         let lasts = torque_after_outage(milliseconds);
+        assert!(lasts <= 100, "{lasts} ms after an outage of {milliseconds} ms");
+    }
+}
+
+/// G3: a board that has restarted is not heard for a while. The change that makes it fail: only a start-up after the
+/// cyclic loop repeats its stop frames.
+#[test]
+fn g3_a_device_that_restarts_on_a_bus_that_is_deaf_at_first_ends_the_torque_all_the_same() {
+    for milliseconds in (5..300).step_by(5).chain([1000, 2500, 20_000]) {
+        let (_, mut bus) = floating();
+        let mut core = silent_device();
+        bus.deaf = true;
+        bus.run(&mut core, f64::from(milliseconds) / 1000.0);
+        assert!(pulls(&bus), "nobody told the pucks anything");
+        bus.deaf = false;
+        let lasts = torque_lasts(&mut core, &mut bus);
         assert!(lasts <= 100, "{lasts} ms after an outage of {milliseconds} ms");
     }
 }

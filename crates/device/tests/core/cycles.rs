@@ -4,7 +4,7 @@ use control::{Command, Fault, State};
 use device::{Controller, DeviceController, EventKind, Slot, Stage};
 use puck::device::{position_frame, reply16};
 use puck::{
-    Action, CanFrame, CanId, Counts, Destination, GaugeStatus, MotorMode, Node, PropertyId, PuckTorque, Request,
+    Action, CanFrame, CanId, Counts, Destination, GaugeStatus, Group, MotorMode, Node, PropertyId, PuckTorque, Request,
     SafetyMode,
 };
 
@@ -21,6 +21,13 @@ fn lost(core: &DeviceController) -> u32 {
     core.health().counters.lost_replies
 }
 
+/// Words to the pucks to brake since that place in the log.
+fn words_to_brake(bus: &Bus, since: usize) -> usize {
+    let requests = bus.log[since..].iter().filter_map(|(_, frame)| Request::decode(frame).ok());
+    let brakes = |action: &Action| matches!(action, Action::Set { property: PropertyId::MODE, value: 0 });
+    requests.filter(|request| request.to == Group::ARM.into() && brakes(&request.action)).count()
+}
+
 #[test]
 fn torque_needs_an_active_arm_and_a_command() {
     let (mut core, mut bus) = started();
@@ -32,10 +39,10 @@ fn torque_needs_an_active_arm_and_a_command() {
     bus.run(&mut core, 1.0);
     assert_eq!(core.stage(), Stage::Ready);
     assert!(!has_torque(&bus, 0), "active, but nobody has commanded anything");
-    // Both zero frames of every cycle were sent all the same: a puck keeps its last torque until it hears another. So
-    // were the two with which the start-up begins.
+    // Both zero frames of every cycle were sent all the same: a puck keeps its last torque until it hears another.
+    let looped = bus.loop_begins().expect("a cycle");
     let cycles = core.health().counters.cycles as usize;
-    assert_eq!(bus.torques_since(0).count(), (cycles + 1) * 8);
+    assert_eq!(bus.torques_since(looped).count(), cycles * 8);
 
     let (_, bus) = floating();
     assert!(has_torque(&bus, 0), "and with a command there is torque");
@@ -278,17 +285,14 @@ fn g7_brakes_are_asked_for_every_20_ms_until_they_are_on_even_if_the_module_was_
 }
 
 /// G7: the safety module is IDLE and says so, its frame to the pucks was lost, and so are for 0.1 s those of the device
-/// and every answer of puck 1 about its mode: the words to brake go on, two in a cycle, until it answers.
+/// and every answer of puck 1 about its mode: the words to brake go on, three in a cycle, until it answers. Zero
+/// torques alone let the arm fall, so they leave in every fourth cycle only. The changes that make it fail: two words
+/// in a cycle, or zero torques in every cycle.
 #[test]
 fn g7_pucks_are_told_to_brake_until_one_has_told_that_it_does() {
     let (mut core, mut bus) = floating();
     bus.safety_mode = SafetyMode::Idle;
     bus.pucks[0].lose_properties = u32::MAX;
-    let words = |bus: &Bus, since: usize| {
-        let requests = bus.log[since..].iter().filter_map(|(_, frame)| Request::decode(frame).ok());
-        let brakes = |action: &Action| matches!(action, Action::Set { property: PropertyId::MODE, value: 0 });
-        requests.filter(|request| brakes(&request.action)).count()
-    };
     while core.health().state == State::Gravity {
         bus.run_slots(&mut core, 1);
     }
@@ -299,18 +303,37 @@ fn g7_pucks_are_told_to_brake_until_one_has_told_that_it_does() {
             puck.mode = MotorMode::Torque;
         }
     }
-    assert!(words(&bus, begin) >= 50, "{} words in 0.1 s", words(&bus, begin));
+    assert!(words_to_brake(&bus, begin) >= 80, "{} words in 0.1 s", words_to_brake(&bus, begin));
+    let zeros = bus.torques_since(begin).count() / 8;
+    assert!((7..=8).contains(&zeros), "{zeros} times zero torques in 30 cycles");
     bus.pucks[0].lose_properties = 0;
     bus.run(&mut core, 0.02);
     assert!(bus.pucks.iter().all(|puck| puck.mode == MotorMode::Idle), "nobody asked again");
     let begin = bus.log.len();
     bus.run(&mut core, 0.5);
-    assert_eq!(words(&bus, begin), 0, "they brake");
+    assert_eq!(words_to_brake(&bus, begin), 0, "they brake");
     bus.press_activate();
     bus.run(&mut core, 0.1);
     bus.commands.push_back(Command::Gravity.into());
     bus.run(&mut core, 0.1);
     assert_eq!(core.health().state, State::Gravity, "{:?}", bus.events);
+}
+
+/// G7: nothing is heard any more, not even the last words of the cycles, and the bus is started anew: its first 0.1 s
+/// have words to brake in nearly every slot, before it asks who is there. The change that makes it fail: stop frames
+/// 3 ms apart.
+#[test]
+fn g7_a_bus_that_is_started_anew_has_the_pucks_brake_before_it_asks_for_them() {
+    let (mut core, mut bus) = floating();
+    bus.pucks.iter_mut().for_each(|puck| (puck.lose, puck.lose_properties) = (u32::MAX, u32::MAX));
+    while core.stage() != Stage::Enumerating {
+        bus.run_slots(&mut core, 1);
+        bus.pucks.iter_mut().for_each(|puck| puck.mode = MotorMode::Torque);
+    }
+    let begin = bus.log.len();
+    bus.run(&mut core, 0.09);
+    assert!(words_to_brake(&bus, begin) >= 60, "{} words in 0.09 s", words_to_brake(&bus, begin));
+    assert!(bus.torques_since(begin).count() / 4 >= 10, "torque ends although a puck does not brake");
 }
 
 /// G7: the safety module is IDLE, but its frame to the pucks was lost, and so are those of the device for 0.1 s.

@@ -22,6 +22,8 @@ use puck::{
 const LATENCY_US: u64 = 200;
 /// From the wake to the first answer, us.
 pub(crate) const BOOT_US: u64 = 500_000;
+/// A start-up repeats its stop frames for so long, us, and no longer.
+pub(crate) const STOPS_US: u64 = 510_000;
 /// VERS of the boot loader: deliberately one that would choose wrong property numbers.
 pub(crate) const MONITOR_VERSION: i32 = 90;
 
@@ -294,6 +296,17 @@ impl Bus {
             Ok(Action::PackedTorques { torques, .. }) => torques.to_vec(),
             _ => Vec::new(),
         })
+    }
+
+    /// Place of the first frame of the cyclic loop in the log, if it has begun: a request for positions, and in the
+    /// same slot one for a wrench, or torques in the next. Torques before `STOPS_US` are stop frames.
+    pub(crate) fn loop_begins(&self) -> Option<usize> {
+        let begins = |(time, frame): &(u64, CanFrame)| match Request::decode(frame).expect("a request").action {
+            Action::Get { property: PropertyId::FORCE_TORQUE } => true,
+            Action::PackedTorques { .. } => *time > STOPS_US,
+            _ => false,
+        };
+        Some(self.log.iter().position(begins)? - 1)
     }
 
     /// All SETs that were sent, with their time.

@@ -9,7 +9,9 @@ use puck::{
     Request,
 };
 
-use crate::double::{Bus, HOME, floating, holding_with_hand, holding_with_ready_hand, silent_device, started};
+use crate::double::{
+    Bus, HOME, STOPS_US, floating, holding_with_hand, holding_with_ready_hand, silent_device, started,
+};
 
 /// Slots of a control cycle.
 const CYCLE: usize = 3;
@@ -76,11 +78,13 @@ fn move_hand(bus: &mut Bus) {
 fn an_arm_without_a_hand_hears_nothing_of_one() {
     let (mut core, mut bus) = floating();
     assert_eq!((core.health().hand, news(&bus)), (HandStage::Absent, vec![]));
-    let [(_, _, first), asked @ ..] = &to_hand(&bus, 0)[..] else { panic!("nothing was sent to a hand") };
-    assert_eq!(*first, Action::Set { property: PropertyId::MODE, value: 0 }, "it may be driven from an earlier life");
+    let sent = to_hand(&bus, 0);
+    let is_stop = |action: &Action| *action == Action::Set { property: PropertyId::MODE, value: 0 };
+    assert!(sent.first().is_some_and(|(_, _, first)| is_stop(first)), "it may be driven from an earlier life");
+    let is_asked = |action: &Action| matches!(action, Action::Get { property: PropertyId::STAT });
     assert!(
-        asked.iter().all(|(_, _, action)| matches!(action, Action::Get { property: PropertyId::STAT })),
-        "{asked:?}"
+        sent.iter().all(|(time, _, action)| is_asked(action) || (is_stop(action) && *time <= STOPS_US)),
+        "{sent:?}"
     );
     bus.commands.push_back(Command::InitialiseHand);
     bus.run(&mut core, 0.1);
@@ -95,7 +99,9 @@ fn a_hand_is_woken_braked_and_then_left_alone_until_a_person_asks() {
     let mut expected = vec![set_mode(Group::HAND, MotorMode::Idle)];
     expected.extend(Node::HAND.into_iter().map(|node| (Destination::Node(node), PropertyId::STAT, 2)));
     expected.push(set_mode(Group::HAND, MotorMode::Idle));
-    assert_eq!(sets(&bus, 0), expected);
+    let mut sets = sets(&bus, 0);
+    sets.dedup();
+    assert_eq!(sets, expected);
     let asked = |property| {
         let question = Action::Get { property };
         to_hand(&bus, 0).iter().any(|(_, _, action)| *action == question)
