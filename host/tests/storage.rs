@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::common;
-use crate::tool::tactus;
+use crate::tool::{Refusal, learned, refusal, said, succeeds, tactus};
 
 const DEVICE: &str = "--device sil:world=simple,flash=arm.flash --non-interactive";
 
@@ -58,4 +58,45 @@ fn h11_an_image_that_the_flash_has_lost_is_named_and_an_upload_brings_it_back() 
     assert_eq!(told(at, "status")["storage"], sound);
     let stored = told(at, "list")["primitives"].as_array().unwrap().len();
     assert_eq!(stored, 2);
+}
+
+/// Damages the last value of the flash that begins in this way.
+fn damage(file: &Path, begins: &[u8], offset: usize) {
+    let mut flash = std::fs::read(file).unwrap();
+    let place = flash.windows(begins.len()).rposition(|bytes| bytes == begins).unwrap();
+    flash[place + offset] ^= 0x10;
+    std::fs::write(file, flash).unwrap();
+}
+
+/// `run reach` played the older image without a word, and of one that was lost as a whole it was said that there is
+/// none.
+///
+/// The changes that make it fail: `run` takes what `get` takes; `get::failure` does not ask for losses.
+#[test]
+fn h11_a_run_by_name_does_not_play_an_image_of_before_and_tells_of_a_lost_one() {
+    let folder = learned(3.0);
+    let at = folder.path();
+    succeeds(at, "learn demo.csv --name reach --kernels 30 -o newer.toml");
+    succeeds(at, &format!("{DEVICE} upload reach.toml"));
+    succeeds(at, &format!("{DEVICE} --force upload newer.toml"));
+    damage(&at.join("arm.flash"), b"TACP", 1000);
+    let Refusal { exit, code, message, help } = refusal(at, &format!("{DEVICE} --json run reach"));
+    assert!(exit == 6 && code == "E656" && message.contains("place 0"), "{code}: {message}");
+    assert!(help.contains("`tactus upload FILE`") && help.contains("`tactus get reach`"), "{help}");
+    // Whoever wants the one of before gets it, and is told.
+    let got = said(&succeeds(at, &format!("{DEVICE} get reach -o before.toml")));
+    assert!(got.contains("warning: this is an image of before"), "{got}");
+    succeeds(at, &format!("{DEVICE} run before.toml --dry-run"));
+    // What was lost last is good again with an upload.
+    succeeds(at, &format!("{DEVICE} --force upload newer.toml"));
+    succeeds(at, &format!("{DEVICE} run reach --dry-run"));
+
+    let other = "--device sil:world=simple,flash=other.flash --non-interactive";
+    succeeds(at, &format!("{other} upload reach.toml"));
+    damage(&at.join("other.flash"), b"TACP", 1000);
+    for line in ["run reach", "get reach -o a.toml", "delete reach", "rename reach grasp"] {
+        let Refusal { code, message, help, .. } = refusal(at, &format!("{other} --json {line}"));
+        assert!(code == "E513" && message.contains("is lost ('reach')"), "{line}: {code}: {message}");
+        assert!(help.contains("`tactus upload reach.toml` brings it back"), "{line}: {help}");
+    }
 }

@@ -349,6 +349,9 @@ error_codes! {
         "the hand holds or touches something, or the sensor is adrift by more than 1 N",
         "empty the hand and let nothing touch it, then `tactus tare` again; if the force is the sensor's error, or a load that \
          shall count as nothing, `tactus tare --loaded`";
+    ImageOfBefore = 656: "the device has lost what was stored last under that name, and kept an image of before",
+        "a damaged word of its flash",
+        "`tactus upload FILE` brings the last one back";
     OutOfReach = 660: "the arm does not reach the object in every cell", "the grid is larger than the arm's reach",
         "leave these cells out, for example with `--grid 4x3` or a list of `--cells`";
     ResultsDamaged = 661: "the results in the folder cannot be read", "a line was changed or cut",

@@ -22,7 +22,8 @@ pub struct Cmd {
 pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     const DOING: &str = "delete";
     let mut client = connection::open(global, DOING, |_| {})?;
-    client.delete(&command.name).map_err(|error| get::failure(error, &command.name, global, DOING))?;
+    let deleted = client.delete(&command.name);
+    deleted.map_err(|error| get::failure(&mut client, error, &command.name, global, DOING))?;
     let name = command.name.as_str();
     global.output().result(&Deleted { deleted: name.to_owned() }, format!("deleted '{name}'"))
 }

@@ -7,7 +7,7 @@ use link::{Name, PrimitiveImage, Refusal};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{ErrorCode, Failure, Global, connection, files};
+use super::{ErrorCode, Failure, Global, connection, files, storage};
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::HostError;
@@ -35,6 +35,9 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output_file = files::create(&path, global, &[], "get refused")?;
     let mut client = connection::open(global, DOING, |_| {})?;
     let file = fetch(&mut client, &command.name, global, DOING)?;
+    if let Some(loss) = storage::loss_of(&mut client, &command.name).map_err(|error| error.into_failure(DOING))? {
+        global.output().warn(format!("this is an image of before: {}", storage::missed(&loss)));
+    }
     let text = file.checked_text().map_err(|cause| super::check::failure(cause, &path, DOING))?;
     files::fill(output_file, text.as_bytes(), DOING)?;
     let content = file.checksum();
@@ -56,14 +59,28 @@ pub struct Gotten {
 }
 
 /// The failure of a request about a primitive in the device: one that is not there is named, with the place where it
-/// may be.
-pub(super) fn failure(error: HostError, name: &Name, global: &Global, doing: &str) -> Failure {
+/// may be, and one that the storage has lost is told to be lost.
+pub(super) fn failure(
+    client: &mut Client<Device>,
+    error: HostError,
+    name: &Name,
+    global: &Global,
+    doing: &str,
+) -> Failure {
     if !matches!(error, HostError::Refused { reason: Refusal::NoSuchPrimitive, .. }) {
         return error.into_failure(doing);
     }
-    let failure = error.into_failure(format!("{doing} '{name}'"));
     let file = format!("{name}.toml");
-    if Path::new(&file).is_file() {
+    let is_file = Path::new(&file).is_file();
+    let doing = format!("{doing} '{name}'");
+    // What the device refused counts, also where it cannot tell of its storage.
+    if let Some(loss) = storage::loss_of(client, name).unwrap_or_default() {
+        let file = if is_file { quoted::text(&file) } else { "FILE".to_owned() };
+        return Failure::new(error.code(), doing, format!("{error}; {}", storage::missed(&loss)))
+            .help(format!("`tactus upload {file}` brings it back; `tactus list` tells all that is lost"));
+    }
+    let failure = error.into_failure(doing);
+    if is_file {
         let file = quoted::text(&file);
         return failure.help(format!("there is a file {file}: `tactus run {file}`, or `tactus upload {file}`"));
     }
@@ -76,6 +93,28 @@ pub(super) fn failure(error: HostError, name: &Name, global: &Global, doing: &st
     failure
 }
 
+/// The primitive that the device stores under a name, to be played: a person who names it means what was stored last.
+///
+/// # Errors
+/// As [`fetch`]; the storage has lost what was stored last, and kept an image of before.
+pub(super) fn fetch_newest(
+    client: &mut Client<Device>,
+    name: &Name,
+    global: &Global,
+    doing: &str,
+) -> Result<PrimitiveFile, Failure> {
+    let file = fetch(client, name, global, doing)?;
+    let Some(loss) = storage::loss_of(client, name).map_err(|error| error.into_failure(doing))? else {
+        return Ok(file);
+    };
+    let cause = format!("'{name}' in the device is an image of before: {}", storage::missed(&loss));
+    let help = format!(
+        "`tactus upload FILE` brings the last one back; whoever wants the one of before: `tactus get {name}`, then \
+         `tactus run {name}.toml`"
+    );
+    Err(Failure::new(ErrorCode::ImageOfBefore, format!("{doing} refused"), cause).help(help))
+}
+
 /// The primitive that the device stores under a name.
 pub(super) fn fetch(
     client: &mut Client<Device>,
@@ -83,7 +122,7 @@ pub(super) fn fetch(
     global: &Global,
     doing: &str,
 ) -> Result<PrimitiveFile, Failure> {
-    let image = client.read_image(name, |_| {}).map_err(|error| failure(error, name, global, doing))?;
+    let image = client.read_image(name, |_| {}).map_err(|error| failure(client, error, name, global, doing))?;
     let image =
         PrimitiveImage::parse(&image).map_err(|cause| Failure::new(ErrorCode::ReadBackDiffers, doing, cause))?;
     let file = PrimitiveFile::from_image(Path::new(name.as_str()), &image);

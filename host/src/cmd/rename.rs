@@ -53,7 +53,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         client.delete(new).map_err(|error| error.into_failure(DOING))?;
         renamed = client.rename(old, new);
     }
-    renamed.map_err(|error| get::failure(error, old, global, DOING))?;
+    renamed.map_err(|error| get::failure(&mut client, error, old, global, DOING))?;
     let data = Renamed { old: old.as_str().to_owned(), new: new.as_str().to_owned() };
     global.output().result(&data, format!("'{old}' is '{new}' now"))
 }

@@ -99,7 +99,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let stored = stored_name(&command.primitive);
     let mut opened = stored.is_some().then(|| open(command, global)).transpose()?;
     let file = match (&stored, &mut opened) {
-        (Some(name), Some(client)) => get::fetch(client, name, global, DOING)?,
+        (Some(name), Some(client)) => get::fetch_newest(client, name, global, DOING)?,
         _ => upload::read(&command.primitive, DOING)?,
     };
     check_expectation(&file, command, output)?;

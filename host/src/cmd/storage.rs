@@ -3,7 +3,7 @@
 use lab::client::Client;
 use lab::device::Device;
 use lab::error::HostError;
-use link::Refusal;
+use link::{LostImage, Name, Refusal};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -62,6 +62,30 @@ pub(super) fn ask(client: &mut Client<Device>) -> Result<Option<Storage>, HostEr
         settings_lost: (0..settings.len()).filter(is_lost).map(|place| settings[place]).collect(),
         unread: report.unread,
     }))
+}
+
+/// What the device has lost of a primitive: what was changed last at its place, or all of it. One whose name cannot be
+/// read may be it.
+///
+/// # Errors
+/// The device does not answer, or still reads its storage.
+pub(super) fn loss_of(client: &mut Client<Device>, name: &Name) -> Result<Option<LostImage>, HostError> {
+    let (_, lost) = client.storage()?;
+    if lost.is_empty() {
+        return Ok(None);
+    }
+    let place = client.find(name)?.map(|listing| listing.index);
+    Ok(lost.into_iter().find(|loss| match place {
+        Some(place) => loss.place == place,
+        None => loss.name.as_ref().is_none_or(|lost| lost == name),
+    }))
+}
+
+/// The loss in words.
+pub(super) fn missed(loss: &LostImage) -> String {
+    let place = loss.place;
+    let what = loss.name.as_ref().map_or("an image whose name cannot be read".to_owned(), |name| format!("'{name}'"));
+    format!("what was stored last at place {place} of its storage is lost ({what})")
 }
 
 /// Complaints about it, one line each, with what helps; empty where all is well.
