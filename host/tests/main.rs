@@ -38,6 +38,7 @@ mod payload;
 mod schemas;
 mod secret;
 mod settings;
+mod silent_hand;
 mod stand_in;
 mod storage;
 mod strange_files;

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use control::Fault;
-use device::Stage;
+use device::{HandFailure, Stage};
 use link::{HandStage, HomeSource, Refusal, Secret, SecretState, Status};
 use signal_hook::iterator::Signals;
 
@@ -364,6 +364,16 @@ pub(super) fn failure(error: ProcedureError, doing: &str) -> Failure {
         ProcedureError::Diverted(_) => ErrorCode::Diverted,
         ProcedureError::TooLong { .. } => ErrorCode::TooLong,
         ProcedureError::Hand(_) => ErrorCode::HandNotReady,
+        // Nothing holds its fingers.
+        ProcedureError::HandLost
+        | ProcedureError::HandPuck {
+            failure: HandFailure::Missing | HandFailure::NoAnswer | HandFailure::Silent,
+            ..
+        } => {
+            return Failure::new(ErrorCode::HandNotReady, doing, error)
+                .help("check the hand's cable, then `tactus hand init`; the fingers will open");
+        }
+        ProcedureError::HandPuck { .. } => ErrorCode::HandNotReady,
         ProcedureError::Recording(_) => return Failure::of_file(ErrorCode::RecordingNotWritten, doing, error),
     };
     Failure::new(code, doing, error)

@@ -148,7 +148,8 @@ fn of_device(status: &Status, drives: Capabilities, mode: Mode, start: &Waypoint
     }
     let is_there = drives.arm || status.hand_stage != HandStage::Absent;
     let hand = match status.hand_stage {
-        HandStage::NotInitialised | HandStage::Failed => "its fingers go to their stops first",
+        HandStage::NotInitialised => "its fingers go to their stops first",
+        HandStage::Failed => "it failed before; its fingers go to their stops first",
         stage => stage.name(),
     };
     list.push(item("hand", hand, is_there, Refusal::NoHand));

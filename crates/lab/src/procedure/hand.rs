@@ -3,11 +3,13 @@
 use std::time::Duration;
 
 use control::State;
-use link::HandStage;
+use device::HandFailure;
+use link::{EventKind, HandStage};
+use puck::Node;
 
 use super::ProcedureError;
-use super::wait::{EndCondition, pass};
-use crate::client::Client;
+use super::wait::{EndCondition, after, pass};
+use crate::client::{Client, Incoming};
 use crate::device::Device;
 
 /// Longest initialisation, s; it takes about five.
@@ -64,12 +66,16 @@ pub fn initialise_hand(client: &mut Client<Device>) -> Result<HandStage, Procedu
         }
     }
     let deadline = client.now() + Duration::from_secs(INITIALISATION);
+    let mut cause = None;
     loop {
-        pass(client, LOOK, EndCondition::OnFault)?;
+        look(client, &mut cause)?;
         match client.status()?.hand_stage {
             HandStage::Ready => return Ok(HandStage::Ready),
             HandStage::Absent => return Err(ProcedureError::Hand("a puck of it does not answer any more")),
             HandStage::Failed => {
+                if let Some((node, failure)) = cause {
+                    return Err(ProcedureError::HandPuck { node, failure });
+                }
                 return Err(ProcedureError::Hand("a finger did not come to its stop, or a puck fell silent"));
             }
             HandStage::NotInitialised => return Err(ProcedureError::Hand("its initialisation was stopped")),
@@ -81,18 +87,38 @@ pub fn initialise_hand(client: &mut Client<Device>) -> Result<HandStage, Procedu
     }
 }
 
+/// Lets a look's time pass, and keeps the puck and the reason for which the device gives the hand up.
+fn look(client: &mut Client<Device>, cause: &mut Option<(Node, HandFailure)>) -> Result<(), ProcedureError> {
+    let end = client.now() + LOOK;
+    while client.now() < end {
+        let Some(Incoming::Event(event)) = client.next(end.saturating_sub(client.now()))? else { continue };
+        match event.kind {
+            EventKind::State if event.detail != 0 => after(event.code, event.detail)?,
+            EventKind::Hand => *cause = HandFailure::from_number(event.detail).or(*cause),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// The angles of a hand that counts them: one that is lost in a move tells zeros, and has met nothing.
+fn angles(client: &mut Client<Device>) -> Result<[f32; 4], ProcedureError> {
+    let status = client.status()?;
+    if status.hand_stage == HandStage::Ready { Ok(status.hand) } else { Err(ProcedureError::HandLost) }
+}
+
 /// Moves the hand to `q` (spread, F1, F2, F3; rad) and waits until it stands there or at something it has met. The
 /// device may then have a little of its plan before it.
 ///
 /// # Errors
-/// The device refuses, for example without torque, or the hand does not come to rest.
+/// The device refuses, for example without torque, the hand does not come to rest, or it is lost meanwhile.
 pub fn move_hand(client: &mut Client<Device>, q: [f32; 4]) -> Result<HandReach, ProcedureError> {
     client.move_hand(q, 0.0)?;
     let started = client.now();
-    let (mut last, mut moved) = (client.status()?.hand, started);
+    let (mut last, mut moved) = (angles(client)?, started);
     loop {
         pass(client, LOOK, EndCondition::OnFault)?;
-        let hand = client.status()?.hand;
+        let hand = angles(client)?;
         let distance = |to: &[f32; 4]| hand.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         if distance(&q) < NEAR {
             return Ok(HandReach::Reached);
@@ -121,5 +147,6 @@ pub fn move_hand_to_the_end(client: &mut Client<Device>, q: [f32; 4]) -> Result<
         HandReach::Stopped(_) => (started + LONGEST_PLAN).saturating_sub(client.now()),
     };
     pass(client, rest, EndCondition::OnFault)?;
+    angles(client)?;
     Ok(reach)
 }

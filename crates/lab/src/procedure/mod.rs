@@ -29,7 +29,9 @@ pub use wait::{EndCondition, after, pass, wait_for};
 pub use weigh::{Crossings, cross_postures, slide_postures, weight_in_use};
 
 use control::Fault;
+use device::HandFailure;
 use link::HandStage;
+use puck::Node;
 
 use crate::error::HostError;
 
@@ -114,6 +116,17 @@ pub enum ProcedureError {
     /// The hand did not get ready.
     #[error("the hand does not get ready: {0}")]
     Hand(&'static str),
+    /// The hand did not get ready, for the reason that one of its pucks gave.
+    #[error("the hand does not get ready: its puck {} {failure}", .node.number())]
+    HandPuck {
+        /// The puck.
+        node: Node,
+        /// The reason.
+        failure: HandFailure,
+    },
+    /// The hand was ready, and is not any more.
+    #[error("the hand was lost in its move: a puck of it fell silent or restarted")]
+    HandLost,
     /// The recording cannot be written.
     #[error("the recording cannot be written: {0}")]
     Recording(#[from] std::io::Error),
