@@ -128,6 +128,7 @@ fn a_recording_of_an_arm_that_stands_is_not_said_to_be_learnable() {
     );
 }
 
+/// The change that makes it fail: the help knows a simulated arm only; a person may have a board.
 #[test]
 fn a_socket_at_which_nobody_serves_is_no_cable() {
     let folder = tempfile::tempdir().unwrap();
@@ -139,6 +140,9 @@ fn a_socket_at_which_nobody_serves_is_no_cable() {
         let serving = format!("--device sil: sim --listen unix:{socket}");
         let help = format!("`tactus {serving}`");
         assert!(said(&refused).contains(&help) && !said(&refused).contains("cable"), "{}", said(&refused));
+        for word in ["`--device serial:PORT` or `can:INTERFACE`", "pass its line on"] {
+            assert!(said(&refused).contains(word), "{}", said(&refused));
+        }
         // It serves where the environment names the socket, too: this is how such a device is usually named.
         let mut served = tool::command(folder, format!("{serving} --duration 0.1 --fast").as_str());
         let served = served.env("TACTUS_DEVICE", format!("unix:{socket}")).output().unwrap();

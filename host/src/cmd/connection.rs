@@ -170,7 +170,11 @@ fn socket_help(address: &Address, error: &TransportError) -> Option<String> {
         let address = quoted::text(&address.to_string());
         // Without the device, TACTUS_DEVICE would name this very socket, which can serve nothing.
         let serving = format!("tactus --device sil: sim --listen {address}");
-        format!("nobody serves there: `{serving}` serves a simulated arm, in a terminal of its own")
+        format!(
+            "nobody serves there: `{serving}` serves a simulated arm, in a terminal of its own; a board at this \
+             computer is `--device serial:PORT` or `can:INTERFACE`, and what else was to pass its line on there has to be \
+             started first"
+        )
     };
     match (address, error) {
         (Address::Unix(path), TransportError::Permission { .. }) => {
