@@ -248,3 +248,27 @@ fn arms_that_their_device_does_not_know_yet_come_through_the_tour() {
         assert!(known.iter().all(|joint| *joint <= 0.15), "{arm}: {known:?}");
     }
 }
+
+/// Minutes of measuring were lost with a disk that was full, and of a home that the device keeps since it was not said
+/// so. A limit for files stands for a full disk.
+///
+/// The change that makes it fail: a report that cannot be written ends the command before its result.
+#[test]
+fn what_was_measured_is_told_though_its_report_cannot_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let limited = |line: &str| {
+        let line = format!("ulimit -f 0; exec \"$0\" --non-interactive --device {NOMINAL} {line} --report found.json");
+        let mut command = Command::new("bash");
+        command.current_dir(folder.path()).env("XDG_CONFIG_HOME", folder.path());
+        command.args(["-c", &line, env!("CARGO_BIN_EXE_tactus")]).output().unwrap()
+    };
+    let told: Value = serde_json::from_slice(&limited("--json calibrate friction").stdout).unwrap();
+    assert_eq!(told["error"]["code"], "E235", "{told}");
+    assert_eq!(told["result"]["joints"].as_array().map(Vec::len), Some(7), "{told}");
+    let output = limited("calibrate home --here 0.02,-1.97,0.01,3.1,0,0.03,-0.05");
+    let (shown, said) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(said.contains("error[E235]") && shown.contains("stored in the device"), "{shown}{said}");
+    let said = String::from_utf8_lossy(&limited("calibrate home --set 0,-2,0,3.1,0,0,0").stderr).into_owned();
+    assert!(said.contains("error[E235]") && said.contains("the home is stored in the device"), "{said}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "half a report helps nobody");
+}

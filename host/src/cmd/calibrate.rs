@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::calibration_report::CalibrationReport;
+use super::calibration_report::{self, CalibrationReport};
 use super::{ErrorCode, Failure, Global, Table, connection, friction, learn, payload, weigh};
 use lab::client::Client;
 use lab::device::Device;
@@ -100,10 +100,13 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Action::Home(Home { set: Some(home), report, .. }) => {
             let report = CalibrationReport::open(report.as_deref(), &[], &client, global, DOING)?;
             let stored = store(&mut client, home.map(|angle| angle as f32), None, global);
-            report.write("home", stored.is_ok(), &json!({ "home_rad": home }), global)?;
+            let written = report.write("home", stored.is_ok(), &json!({ "home_rad": home }), global);
             stored?;
             global.tell_forgotten();
-            show(&mut client, global)
+            if written.is_err() {
+                global.output().say("the home is stored in the device; its report is not written");
+            }
+            written.and_then(|()| show(&mut client, global))
         }
         Action::Home(Home { here: Some(truth), at_home, report, .. }) => {
             let report = CalibrationReport::open(report.as_deref(), &[], &client, global, DOING)?;
@@ -111,10 +114,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             let corrected = procedure::correct_home(&mut client, *truth);
             let correction = corrected.map_err(|error| connection::failure(error, DOING))?;
             let stored = store(&mut client, correction.home, Some(&correction), global);
-            report.write("home", stored.is_ok(), &data(&correction), global)?;
+            let written = report.write("home", stored.is_ok(), &data(&correction), global);
             stored?;
             global.tell_forgotten();
-            global.output().result(&data(&correction), format!("{}stored in the device", table(&correction)))
+            let text = format!("{}stored in the device", table(&correction));
+            calibration_report::tell(written, &data(&correction), text, global)
         }
         Action::Home(Home { here: None, set: None, .. }) => {
             Err(Failure::new(ErrorCode::NoAngles, DOING, "no angles are given"))

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use lab::client::Client;
 use lab::device::Device;
 use lab::output_file::OutputFile;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::{Failure, Global, files};
@@ -55,6 +56,26 @@ impl CalibrationReport {
         global.output().say(format!("wrote {}", path.display()));
         Ok(())
     }
+}
+
+/// Tells what was found, also where its report could not be written: minutes of measuring are not lost with a disk.
+///
+/// # Errors
+/// The failure of the report, or standard output does not take it.
+pub(super) fn tell(
+    written: Result<(), Failure>,
+    found: &impl Serialize,
+    text: impl AsRef<str>,
+    global: &Global,
+) -> Result<(), Failure> {
+    let Err(failure) = written else { return global.output().result(found, text) };
+    if !global.json {
+        global.output().result(found, text)?;
+    }
+    Err(match serde_json::to_value(found) {
+        Ok(data) => failure.data(data),
+        Err(_) => failure,
+    })
 }
 
 /// Name of a report: serial number and time, without what a file name cannot have everywhere.

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::calibration_report::CalibrationReport;
+use super::calibration_report::{self, CalibrationReport};
 use super::{ErrorCode, Failure, Global, Table, connection};
 use control::model::{FRICTION_COULOMB, FRICTION_VISCOUS};
 use lab::client::Client;
@@ -48,8 +48,9 @@ pub(super) fn run(command: &Friction, client: &mut Client<Device>, global: &Glob
     let crossings = measured.map_err(|error| connection::failure(error, DOING))?;
     let joints =
         measure(&weight, &crossings).map_err(|error| Failure::new(ErrorCode::FrictionNotTold, DOING, error))?;
-    report.write("friction", false, &data(&joints), global)?;
-    global.output().result(&data(&joints), format!("{}shown only: the device goes on with the model's", table(&joints)))
+    let written = report.write("friction", false, &data(&joints), global);
+    let text = format!("{}shown only: the device goes on with the model's", table(&joints));
+    calibration_report::tell(written, &data(&joints), text, global)
 }
 
 fn table(joints: &[JointFriction; 7]) -> Table {

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::calibration_report::CalibrationReport;
+use super::calibration_report::{self, CalibrationReport};
 use super::{ErrorCode, Failure, Global, Table, connection, payload};
 use lab::client::Client;
 use lab::device::Device;
@@ -64,12 +64,12 @@ pub(super) fn run(command: &Gravity, client: &mut Client<Device>, global: &Globa
     let kept = judged.and_then(|()| {
         client.keep_weight(&weighing.correction).map_err(|error| error.into_failure(DOING).data(data(&weighing)))
     });
-    report.write("gravity", kept.is_ok(), &data(&weighing), global)?;
+    let written = report.write("gravity", kept.is_ok(), &data(&weighing), global);
     kept?;
     global.tell_forgotten();
     let text =
         format!("{}accepted, stored in the device; it takes effect when the arm next has no torque", table(&weighing));
-    global.output().result(&data(&weighing), text)
+    calibration_report::tell(written, &data(&weighing), text, global)
 }
 
 /// The failure of a weight that is not accepted. One that is right already asks for nothing.

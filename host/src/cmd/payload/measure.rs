@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::data::{EarlierError, Measured, ObjectData, next, read_earlier};
 use super::{DOING, Payload, declared};
-use crate::cmd::calibration_report::CalibrationReport;
+use crate::cmd::calibration_report::{self, CalibrationReport};
 use crate::cmd::{ErrorCode, Failure, Global, Table, connection};
 use lab::client::Client;
 use lab::device::Device;
@@ -46,15 +46,18 @@ pub(super) fn run(command: &Payload, client: &mut Client<Device>, global: &Globa
     let found = Measured::new(declared(&kept), &load, object.as_ref(), judged.err(), advice.clone());
     // Texts and numbers only.
     let data = serde_json::to_value(&found).unwrap_or_default();
-    report.write("payload", false, &data, global)?;
+    let written = report.write("payload", false, &data, global);
     let shown =
         format!("{}{}", table(&load), object.as_ref().map(|of| object_table(of).to_string()).unwrap_or_default());
     if let Err(contradiction) = judged {
         global.output().say(shown.trim_end());
+        if let Err(failure) = &written {
+            global.output().warn(failure.to_string());
+        }
         return Err(Failure::new(ErrorCode::PayloadContradicted, DOING, contradiction).data(data));
     }
     let advice = advice.map(|advice| format!("\nnext: {advice}")).unwrap_or_default();
-    global.output().result(&found, format!("{shown}{}{advice}", words(&found, &load)))
+    calibration_report::tell(written, &found, format!("{shown}{}{advice}", words(&found, &load)), global)
 }
 
 /// Judges the whole load, or what was taken up since, which is told more precisely.
