@@ -64,8 +64,8 @@ pub(super) fn ask(client: &mut Client<Device>) -> Result<Option<Storage>, HostEr
     }))
 }
 
-/// What the device has lost of a primitive: what was changed last at its place, or all of it. One whose name cannot be
-/// read may be it.
+/// The loss by which a primitive is not what was stored last under its name, or is not there any more. A lost image
+/// whose name cannot be read may be it.
 ///
 /// # Errors
 /// The device does not answer, or still reads its storage.
