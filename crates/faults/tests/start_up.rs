@@ -47,6 +47,8 @@ fn g2_a_simulated_arm_whose_counts_jumped_is_not_taken_to_stand_at_home() {
     arm.zero(stands).unwrap();
     start_up(&mut arm, false, Stage::WaitingForActive, |_| {}).unwrap();
     arm.clear_fault().unwrap();
+    // The fault's end is told a cycle later; it is none of the hold.
+    wait(&mut arm, 1);
     plant(&mut arm).press(PendantAction::ShiftActivate);
     start_up(&mut arm, false, Stage::Ready, |_| {}).unwrap();
     arm.take_events();

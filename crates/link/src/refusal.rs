@@ -275,7 +275,10 @@ impl Refusal {
             Self::NoSession => {
                 "enter the command again: the device had not heard it for half a second, and let go of it"
             }
-            Self::Busy => "end the program there; `tactus stop` stops the arm from here, `tactus monitor` looks on",
+            Self::Busy => {
+                "end the program there, or enter the command again if it has ended; `tactus stop` stops the arm from \
+                 here, `tactus monitor` looks on"
+            }
             Self::Stale => "send the request again",
             Self::BadValue => "correct the value",
             Self::NotZeroed => {
