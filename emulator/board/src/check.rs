@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use fdcan_model::Cancellation;
-use puck::{CanFrame, CanId, Group, MotorMode, PropertyId, set, zero_torques};
+use puck::{CanFrame, Group, MotorMode, PropertyId, set, zero_torques};
 use serde_json::{Map, Value, json};
 use sim::{FreeJoints, Plant, PlantConfig, TICKS_PER_MICROSECOND, ticks};
 
@@ -92,12 +92,11 @@ pub fn check(image: &Arc<Image>) -> Result<Checked, RunError> {
     Ok(Checked { rows, report, reasons: reasons(image, &outcome) })
 }
 
-/// First frames of the image: zero torques and idle to arm and hand, then it asks the first motor how it is.
+/// First frames of the image: zero torques and idle to arm and hand, then the arm's again, because one may be lost.
 fn first_frames() -> Vec<CanFrame> {
     let [arm, wrist] = zero_torques();
     let idle = |group| set(group, PropertyId::MODE, MotorMode::Idle.value());
-    let motor = CanId::new(1).and_then(|id| CanFrame::from_slice(id, &[5]));
-    [arm, wrist, idle(Group::ARM), idle(Group::HAND)].into_iter().chain(motor).collect()
+    [arm, wrist, idle(Group::ARM), idle(Group::HAND), idle(Group::ARM)].into()
 }
 
 fn in_words(frames: &[CanFrame]) -> String {
