@@ -24,6 +24,13 @@ pub(super) struct Body {
     pub(super) inertia: [f64; 6],
 }
 
+impl Body {
+    /// True of what an empty hand holds, for example: a third of the work is for bodies of this kind.
+    fn is_nothing(&self) -> bool {
+        self.mass == 0.0 && self.inertia == [0.0; 6]
+    }
+}
+
 /// Equation of motion at one state: `mass ddq + velocity = torque`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Dynamics {
@@ -56,18 +63,18 @@ impl Dynamics {
     pub(super) fn of(bodies: &[Body], frames: &[Frame; 8], speeds: &[f64; 7]) -> Self {
         let motions = motions(frames, speeds);
         let mut dynamics = Dynamics { mass: [[0.0; 7]; 7], velocity: [0.0; 7] };
-        for body in bodies {
+        for body in bodies.iter().filter(|body| !body.is_nothing()) {
             let (frame, motion) = (&frames[body.link + 1], &motions[body.link]);
             let centre = frame.point(body.centre);
             let inertia = |about: Vector| frame.turn(times(&body.inertia, frame.turn_back(about)));
             let force = motion.at(subtract(centre, frames[body.link].origin)).map(|rate| rate * body.mass);
             let spin = add(inertia(motion.turn_rate), cross(motion.turn, inertia(motion.turn)));
             // Axis of each joint, and the way of the centre if it turns.
-            let ways: [(Vector, Vector); 7] = std::array::from_fn(|joint| {
-                let Frame { origin, axes: [.., axis] } = frames[joint];
-                (axis, cross(axis, subtract(centre, origin)))
-            });
-            for (row, (axis, way)) in ways.into_iter().enumerate().take(body.link + 1) {
+            let mut ways = [(Vector::default(), Vector::default()); 7];
+            for row in 0..=body.link {
+                let Frame { origin, axes: [.., axis] } = frames[row];
+                let way = cross(axis, subtract(centre, origin));
+                ways[row] = (axis, way);
                 let (pushed, turned) = (way.map(|part| part * body.mass), inertia(axis));
                 dynamics.velocity[row] += dot(way, force) + dot(axis, spin);
                 for (column, (other, its_way)) in ways.into_iter().enumerate().take(row + 1) {
@@ -99,11 +106,14 @@ impl Dynamics {
             let carried: f64 = self.mass[row].iter().zip(speeds).map(|(mass, speed)| mass * speed).sum();
             carried + STEP_SECONDS * (torques[row] - self.velocity[row])
         });
+        // Of the other joints only, and still one sum of seven: a sum with a gap is not unrolled.
+        let mut coupling = self.mass;
+        (0..7).for_each(|joint| coupling[joint][joint] = 0.0);
         let mut next = *speeds;
         for _ in 0..SWEEPS {
             let mut change = 0.0f64;
             for row in 0..7 {
-                let of_others: f64 = (0..7).filter(|other| *other != row).map(|k| self.mass[row][k] * next[k]).sum();
+                let of_others: f64 = coupling[row].iter().zip(&next).map(|(mass, speed)| mass * speed).sum();
                 let left = momentum[row] - of_others;
                 let rubbed = left.signum() * (left.abs() - STEP_SECONDS * coulomb[row]).max(0.0);
                 let (slowest, fastest) = bounds[row];
