@@ -54,6 +54,18 @@ fn a_drift_becomes_zero_at_once_and_a_load_only_when_a_person_says_so() {
 }
 
 #[test]
+fn a_hand_that_is_not_initialised_is_said_to_have_got_no_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let _arm = Arm::start(folder, &drift(0.2));
+    let output = tactus(folder, "--json tare --at-home");
+    let tared: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(tared["after"]["gauges_nm"].is_null(), "{tared}");
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("the hand is not initialised") && said.contains("tactus hand init"), "{said}");
+}
+
+#[test]
 fn an_arm_that_ends_with_the_command_says_that_its_zero_does_too() {
     let folder = tempfile::tempdir().unwrap();
     let tared = object(folder.path(), "--device sil:world=simple tare", 0);

@@ -2,6 +2,7 @@
 
 use clap::Args;
 use lab::procedure::{self, Reading, Tared};
+use link::HandStage;
 
 use super::{Failure, Global, Table, connection};
 
@@ -34,6 +35,12 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let tared = procedure::tare(&mut client, command.loaded);
     let tared = tared.map_err(|error| connection::failed(&mut client, error, DOING))?;
+    let hand = client.status().map_err(|error| error.into_failure(DOING))?.hand_stage;
+    if tared.after.gauges_nm.is_none() && hand != HandStage::Absent {
+        global
+            .output()
+            .say(format!("the hand is {}: its gauges have got no zero; first: tactus hand init", hand.name()));
+    }
     if global.is_simulated_here() {
         let device = if is_arm { "arm" } else { "hand" };
         global.output().say(format!(
