@@ -164,9 +164,10 @@ fn d3_a_core_that_stands_still_is_reset_by_the_watchdog() {
 
 #[test]
 fn d3_a_watchdog_that_does_not_take_its_window_lets_nothing_move() {
-    let story = tell_with(0.5, &["watchdog-deaf@1000"]);
+    let story = tell_with(0.05, &["watchdog-deaf@1000"]);
     let resets = story.resets();
-    assert!(resets.len() > 3 && resets.iter().all(|(_, cause)| *cause == "Core"), "{resets:?}");
+    // Eleven starts; each is translated anew, which is what takes the time.
+    assert!(resets.len() > 10 && resets.iter().all(|(_, cause)| *cause == "Core"), "{resets:?}");
     assert!(story.log_says("the watchdog does not take its window"), "{:#?}", story.log());
     assert!(!story.sent_since(0).iter().any(|(_, frame)| is_torque(frame)));
 }

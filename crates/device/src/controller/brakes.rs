@@ -36,6 +36,8 @@ pub(super) struct Brakes {
     suspect: (usize, u8),
     /// Urgent cycles left.
     urgent: u16,
+    /// Torque flowed in the last cycle of an open request.
+    flowed: bool,
 }
 
 impl Brakes {
@@ -113,11 +115,20 @@ impl Brakes {
         due.then(brake_frame)
     }
 
-    /// A control slot after the end of the torque: true if its zero torques are to leave.
-    pub(super) fn begin_cycle(&mut self) -> bool {
+    /// A control slot of an open request; `flows`: torque still flows, or flows again. True if its torques are to leave.
+    pub(super) fn begin_cycle(&mut self, flows: bool) -> bool {
+        let has_ended = core::mem::replace(&mut self.flowed, flows) && !flows;
+        if has_ended {
+            self.urgent = URGENT_CYCLES;
+        }
+        if flows && !self.wanted {
+            // A person has commanded the arm again.
+            self.look_slots = 0;
+        }
         let Some(left) = self.urgent.checked_sub(1).filter(|_| self.is_open()) else { return true };
         self.urgent = left;
-        (URGENT_CYCLES - 1 - left).is_multiple_of(ZEROS_EVERY)
+        // A torque that is held back makes the next step larger than the limiter grants.
+        flows || (URGENT_CYCLES - 1 - left).is_multiple_of(ZEROS_EVERY)
     }
 
     /// The word to the pucks for a request or a control slot.
@@ -151,4 +162,35 @@ impl Brakes {
 /// The word to the pucks of the arm that they shall brake.
 fn brake_frame() -> CanFrame {
     set(Group::ARM, PropertyId::MODE, MotorMode::Idle.value())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Storm 119029: the brakes are asked for while torque damps an arm of which one joint is unseen, and a step of
+    /// that torque was twice what the limiter grants. The changes that make it fail: torque that flows leaves as rarely
+    /// as zero torques; urgent cycles that are used up while it flows.
+    #[test]
+    fn g7_torque_that_still_flows_leaves_in_every_cycle_and_its_end_is_urgent() {
+        let mut brakes = Brakes::default();
+        brakes.want(true);
+        assert!((0..URGENT_CYCLES + 7).all(|_| brakes.begin_cycle(true)));
+        let zeros = (0..URGENT_CYCLES).filter(|_| {
+            let leaves = brakes.begin_cycle(false);
+            assert!(brakes.urgent_frame().is_some() || brakes.urgent == 0);
+            leaves
+        });
+        assert_eq!(zeros.count(), usize::from(URGENT_CYCLES.div_ceil(ZEROS_EVERY)));
+    }
+
+    /// The change that makes it fail: a request that stays open while a person commands the arm again.
+    #[test]
+    fn g7_an_arm_that_is_commanded_again_is_not_told_to_brake() {
+        let mut brakes = Brakes::default();
+        brakes.want(true);
+        assert!(brakes.begin_cycle(false) && brakes.urgent_frame().is_some());
+        brakes.want(false);
+        assert!(brakes.begin_cycle(true) && brakes.urgent_frame().is_none() && !brakes.is_open());
+    }
 }

@@ -291,11 +291,11 @@ impl DeviceController {
         }
     }
 
-    /// The word to brake before the zero torques of a cycle; true if these are to leave too.
+    /// The word to brake before the torques of a cycle; true if these are to leave too.
     #[cold]
     #[inline(never)]
     fn brakes_first(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) -> bool {
-        let torques_too = self.brakes.begin_cycle();
+        let torques_too = self.brakes.begin_cycle(self.cycle.state().has_torque());
         self.tell_to_brake(now_us, io);
         torques_too
     }
