@@ -115,7 +115,7 @@ impl Brakes {
         due.then(brake_frame)
     }
 
-    /// A control slot of an open request; `flows`: torque still flows, or flows again. True if its torques are to leave.
+    /// A control slot of an open request; `flows`: torque still flows, or does again. True if its torques are to leave.
     pub(super) fn begin_cycle(&mut self, flows: bool) -> bool {
         let has_ended = core::mem::replace(&mut self.flowed, flows) && !flows;
         if has_ended {
