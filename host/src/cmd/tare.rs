@@ -35,8 +35,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let tared = procedure::tare(&mut client, command.loaded);
     let tared = tared.map_err(|error| connection::failed(&mut client, error, DOING))?;
-    let hand = client.status().map_err(|error| error.into_failure(DOING))?.hand_stage;
-    if tared.after.gauges_nm.is_none() && hand != HandStage::Absent {
+    // The zero is taken: what is only told beside it fails nothing.
+    if tared.after.gauges_nm.is_none()
+        && let Ok(hand) = client.status().map(|status| status.hand_stage)
+        && hand != HandStage::Absent
+    {
         global
             .output()
             .say(format!("the hand is {}: its gauges have got no zero; first: tactus hand init", hand.name()));
