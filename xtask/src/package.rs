@@ -40,6 +40,7 @@ pub(crate) fn run() -> Result<()> {
             cargo.current_dir(&package).env("CARGO_TARGET_DIR", folder.join("target"));
             // As in the workspace: without it the tests of the arithmetic take minutes.
             cargo.env("CARGO_PROFILE_DEV_OPT_LEVEL", "1").env("CARGO_PROFILE_DEV_DEBUG", "line-tables-only");
+            cargo.env("CARGO_PROFILE_DEV_LTO", "off").env("CARGO_PROFILE_DEV_CODEGEN_UNITS", "16");
             cargo
         };
         shell::run(there().args(["test", "--quiet", "--all-features"]))?;
