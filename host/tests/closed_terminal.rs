@@ -1,12 +1,12 @@
-//! Terminals and the programs that were started in them: a closed one ends what it showed, and its Ctrl-C reaches those
-//! that know how to stop an arm.
+//! Terminals and the programs that were started in them: a closed one ends what it showed, its Ctrl-Z gives it to the
+//! shell for a while, and its Ctrl-C reaches those that know how to stop an arm.
 
 #![cfg(target_os = "linux")]
 
 use std::fs::File;
-use std::io::{Read as _, read_to_string};
+use std::io::{Read as _, Write as _, read_to_string};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{ChildStdout, Command, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 
@@ -32,13 +32,7 @@ fn ends_with_its_terminal(folder: &Path) -> bool {
     let alive = folder.join("alive");
     let (sender, ended) = mpsc::channel();
     std::thread::spawn(move || sender.send(read_to_string(File::open(alive).unwrap())));
-    let mut shown = terminal.stdout.take().unwrap();
-    let (mut seen, mut bytes) = (Vec::new(), [0; 4096]);
-    while !String::from_utf8_lossy(&seen).contains("joints") {
-        let count = shown.read(&mut bytes).unwrap();
-        assert!(count > 0, "{}", String::from_utf8_lossy(&seen));
-        seen.extend_from_slice(&bytes[..count]);
-    }
+    until(terminal.stdout.as_mut().unwrap(), "joints");
     terminal.kill().unwrap();
     terminal.wait().unwrap();
     let has_ended = ended.recv_timeout(TIMEOUT).is_ok();
@@ -47,6 +41,47 @@ fn ends_with_its_terminal(folder: &Path) -> bool {
         let _ = Command::new("kill").args(["-9", process.trim()]).status();
     }
     has_ended
+}
+
+/// Reads what a terminal shows until these words have come.
+fn until(shown: &mut ChildStdout, words: &str) {
+    let (mut seen, mut bytes) = (Vec::new(), [0; 4096]);
+    while !String::from_utf8_lossy(&seen).contains(words) {
+        let count = shown.read(&mut bytes).unwrap();
+        assert!(count > 0, "not '{words}': {}", String::from_utf8_lossy(&seen));
+        seen.extend_from_slice(&bytes[..count]);
+    }
+}
+
+/// Ctrl-Z did nothing in the monitor; stopped from outside, it drew later only what had changed.
+#[test]
+fn a_monitor_that_is_suspended_gives_the_terminal_to_the_shell_and_draws_all_of_it_when_it_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = format!(
+        "stty rows 24 cols 80; set -m; sh -c 'echo $$ > pid; exec {} --device sil:world=simple monitor'; \
+         echo shell $((6 * 7)); read line; fg; echo shell $((8 * 8)); read line; fg; echo shell $((9 * 9))",
+        env!("CARGO_BIN_EXE_tactus")
+    );
+    let mut terminal = Command::new("timeout");
+    terminal.args(["--foreground", &TIMEOUT.as_secs().to_string(), "script", "-qfc", &line, "/dev/null"]);
+    terminal.current_dir(folder.path()).env("XDG_CONFIG_HOME", folder.path()).env("SHELL", "/bin/sh");
+    let terminal = terminal.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+    let mut terminal = terminal.expect("`script` has to be installed: package bsdutils");
+    let (mut typed, mut shown) = (terminal.stdin.take().unwrap(), terminal.stdout.take().unwrap());
+    until(&mut shown, "joints");
+    typed.write_all(b"\x1a").unwrap();
+    until(&mut shown, "shell 42");
+    typed.write_all(b"\n").unwrap();
+    // What never changes is drawn once more.
+    until(&mut shown, "joints");
+    let process = std::fs::read_to_string(folder.path().join("pid")).unwrap();
+    assert!(Command::new("kill").args(["-STOP", process.trim()]).status().unwrap().success());
+    until(&mut shown, "shell 64");
+    typed.write_all(b"\n").unwrap();
+    until(&mut shown, "joints");
+    typed.write_all(b"Q").unwrap();
+    until(&mut shown, "shell 81");
+    terminal.wait().unwrap();
 }
 
 /// QEMU ended with the first Ctrl-C, before the arm in it had been stopped: `tactus run` ended with E102.

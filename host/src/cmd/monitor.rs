@@ -2,15 +2,12 @@
 
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
-use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 
 use clap::Args;
-use ratatui::DefaultTerminal;
-use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEventKind, KeyModifiers};
 
 use super::{ErrorCode, Failure, Global, Output, connection, teach, upload};
-use crate::monitor::{Streamed, Watch, draw};
+use crate::monitor::{Screen, Streamed, Watch, Wish};
 use lab::client::{Client, Incoming};
 use lab::device::Device;
 use lab::error::HostError;
@@ -62,13 +59,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut view = if global.json {
         View::Lines(global.output())
     } else {
-        let terminal = ratatui::try_init().map_err(|cause| Failure::new(ErrorCode::NoTerminal, DOING, cause))?;
-        View::Screen(terminal, keys())
+        View::Screen(Screen::open().map_err(|cause| Failure::new(ErrorCode::NoTerminal, DOING, cause))?)
     };
     let watched = follow_on(&mut client, &mut watch, &mut view, command.duration);
-    if let View::Screen(..) = view {
-        ratatui::restore();
-    }
+    // What is said of the end belongs to the shell.
+    drop(view);
     match watched {
         Err(Ended::Host(HostError::Interrupted | HostError::Left)) | Ok(()) => Ok(()),
         Err(Ended::Host(error)) => Err(error.into_failure(DOING)),
@@ -90,15 +85,8 @@ impl From<HostError> for Ended {
 
 /// Where it is shown.
 enum View {
-    Screen(DefaultTerminal, Receiver<std::io::Result<Input>>),
+    Screen(Screen),
     Lines(Output),
-}
-
-/// A wish of the person at the keyboard.
-#[derive(PartialEq)]
-enum Wish {
-    Stop,
-    Leave,
 }
 
 /// Follows, and looks on anew wherever the device has let go of this program, which was suspended.
@@ -124,11 +112,8 @@ fn follow_on(
                     return Ok(());
                 }
             }
-            View::Screen(terminal, _) => {
-                // A shell has had the terminal meanwhile.
-                ratatui::restore();
-                *terminal = ratatui::try_init().map_err(broken)?;
-            }
+            // A shell has had the terminal meanwhile.
+            View::Screen(screen) => screen.take_back().map_err(broken)?,
         }
     }
 }
@@ -174,50 +159,17 @@ fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, end: 
             None => {}
         }
         watch.gaps = client.gaps();
-        if let View::Screen(terminal, keys) = view
+        if let View::Screen(screen) = view
             && drawn.is_none_or(|drawn| client.now().saturating_sub(drawn) >= LOOK_EVERY)
         {
-            terminal.draw(|frame| draw(frame, watch)).map_err(broken)?;
+            screen.show(watch).map_err(broken)?;
             drawn = Some(client.now());
-            match wish(keys).map_err(broken)? {
+            match screen.wish().map_err(broken)? {
                 Some(Wish::Stop) => client.order_stop()?,
+                Some(Wish::Suspend) => screen.suspend().map_err(broken)?,
                 Some(Wish::Leave) => return Ok(()),
                 None => {}
             }
         }
     }
-}
-
-/// Input of the keyboard. It is read beside the watching: where a terminal was closed the library that reads it
-/// may never return, and nobody would see any more that the command is to end.
-fn keys() -> Receiver<std::io::Result<Input>> {
-    let (sender, keys) = mpsc::channel();
-    std::thread::spawn(move || {
-        loop {
-            let input = event::read();
-            let is_broken = input.is_err();
-            if sender.send(input).is_err() || is_broken {
-                return;
-            }
-        }
-    });
-    keys
-}
-
-/// The key that was pressed since the last look. A stop counts more than all else.
-fn wish(keys: &Receiver<std::io::Result<Input>>) -> std::io::Result<Option<Wish>> {
-    let mut wish = None;
-    for input in keys.try_iter() {
-        let Input::Key(key) = input? else { continue };
-        if key.kind != KeyEventKind::Press || wish == Some(Wish::Stop) {
-            continue;
-        }
-        wish = match key.code {
-            KeyCode::Char('s' | ' ') => Some(Wish::Stop),
-            KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => Some(Wish::Leave),
-            KeyCode::Char('q') | KeyCode::Esc => Some(Wish::Leave),
-            _ => wish,
-        };
-    }
-    Ok(wish)
 }

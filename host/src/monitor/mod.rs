@@ -2,6 +2,7 @@
 
 mod line;
 mod screen;
+mod terminal;
 
 use std::collections::VecDeque;
 
@@ -16,6 +17,7 @@ use link::{DeviceHello, Event, EventKind, HandStage, Statistics, Status, Telemet
 
 pub use line::{Line, Streamed};
 pub use screen::draw;
+pub use terminal::{Screen, Wish};
 
 /// Events that are kept.
 const EVENTS: usize = 20;
