@@ -53,12 +53,13 @@ fn until(shown: &mut ChildStdout, words: &str) {
     }
 }
 
-/// Ctrl-Z did nothing in the monitor; stopped from outside, it drew later only what had changed.
+/// Ctrl-Z did nothing in the monitor; stopped from outside, it drew later only what had changed. Whatever has started
+/// the monitor (`cargo run`, here a shell) is stopped with it: else nobody gets the terminal.
 #[test]
 fn a_monitor_that_is_suspended_gives_the_terminal_to_the_shell_and_draws_all_of_it_when_it_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let line = format!(
-        "stty rows 24 cols 80; set -m; sh -c 'echo $$ > pid; exec {} --device sil:world=simple monitor'; \
+        "stty rows 24 cols 80; set -m; sh -c 'echo $$ > pid; {} --device sil:world=simple monitor; :'; \
          echo shell $((6 * 7)); read line; fg; echo shell $((8 * 8)); read line; fg; echo shell $((9 * 9))",
         env!("CARGO_BIN_EXE_tactus")
     );
@@ -75,7 +76,7 @@ fn a_monitor_that_is_suspended_gives_the_terminal_to_the_shell_and_draws_all_of_
     // What never changes is drawn once more.
     until(&mut shown, "joints");
     let process = std::fs::read_to_string(folder.path().join("pid")).unwrap();
-    assert!(Command::new("kill").args(["-STOP", process.trim()]).status().unwrap().success());
+    assert!(Command::new("kill").args(["-STOP", "--", &format!("-{}", process.trim())]).status().unwrap().success());
     until(&mut shown, "shell 64");
     typed.write_all(b"\n").unwrap();
     until(&mut shown, "joints");

@@ -7,7 +7,7 @@ use std::sync::mpsc::{self, Receiver};
 
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event as Input, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
-use rustix::process::{Signal, getpid, kill_process};
+use rustix::process::{Signal, kill_current_process_group};
 use signal_hook::consts::signal::SIGCONT;
 
 use super::{Watch, draw};
@@ -64,14 +64,14 @@ impl Screen {
         Ok(())
     }
 
-    /// Gives the terminal to the shell and stops this program, as Ctrl-Z does with any other; returns when it is
-    /// continued. Where no shell waits for it, the system does not stop it.
+    /// Gives the terminal to the shell and stops this program with all of its group, as Ctrl-Z does with any other;
+    /// returns when it is continued. Where no shell waits for it, the system does not stop it.
     ///
     /// # Errors
     /// The terminal cannot be taken back.
     pub fn suspend(&mut self) -> io::Result<()> {
         ratatui::restore();
-        kill_process(getpid(), Signal::TSTP)?;
+        kill_current_process_group(Signal::TSTP)?;
         self.take_back()
     }
 
