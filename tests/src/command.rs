@@ -8,16 +8,16 @@ use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use serde_json::Value;
 
-/// The command that belongs to this build: `target/<profile>/tactus`, two folders above the test.
+/// The command that `cargo xtask build` left for this build folder: `target/tools/tactus`.
 ///
 /// # Panics
 /// It has not been built.
 #[must_use]
 pub fn program() -> PathBuf {
     let test = std::env::current_exe().expect("a running test has a path");
-    let folder = test.parent().and_then(Path::parent).expect("tests lie in target/<profile>/deps");
-    let program = folder.join(format!("tactus{}", std::env::consts::EXE_SUFFIX));
-    assert!(program.is_file(), "there is no {}; `cargo xtask test` builds it", program.display());
+    let folder = test.ancestors().nth(3).expect("tests lie in target/<profile>/deps");
+    let program = folder.join("tools/tactus");
+    assert!(program.is_file(), "there is no {}; `cargo xtask build` puts it there", program.display());
     program
 }
 

@@ -17,28 +17,38 @@ pub(crate) const WORLD: &str = "tactus/mujoco,lab/mujoco,experiment/mujoco,sim/m
 /// File name of the hand's image beside the tools.
 pub(crate) const HAND: &str = "hand.elf";
 
-/// `cargo build` or `cargo test` of all host packages, optimised, with the MuJoCo world.
+/// `cargo build` or `cargo test` of all host packages with the MuJoCo world.
 ///
-/// Every optimised build selects the same packages and features, whatever it then needs of them: the features of a
-/// dependency follow from the selection, so another selection would build half of the house once more.
-pub(crate) fn optimised(verb: &str) -> Command {
+/// In the development profile, as `cargo build` at the root: what lies below the world is then built once for both, and
+/// what is used has the overflow checks that its tests had. Every such build selects the same packages and features,
+/// whatever it then needs of them: the features of a dependency follow from the selection, so another selection would
+/// build half of the house once more.
+pub(crate) fn with_the_world(verb: &str) -> Command {
     let mut cargo = shell::cargo();
-    cargo.args([verb, "--release", "--workspace", "--exclude", "firmware", "--features", WORLD]);
+    cargo.args([verb, "--workspace", "--exclude", "firmware", "--features", WORLD]);
     cargo
 }
 
-/// Builds the `tactus` command with the MuJoCo world, optimised; returns its path.
+/// Builds the `tactus` command with the MuJoCo world; returns its path.
+///
+/// It is put into a folder of its own, from which a `cargo build` or `cargo test` without the world does not take it.
 pub(crate) fn host() -> Result<PathBuf> {
     shell::step("building the tactus command");
-    shell::run(optimised("build").args(["--bin", "tactus"]))?;
-    Ok(shell::target_dir().join("release").join("tactus"))
+    shell::run(with_the_world("build").args(["--bin", "tactus"]))?;
+    let folder = shell::target_dir().join("tools");
+    fs::create_dir_all(&folder)?;
+    let tactus = folder.join("tactus");
+    place(&shell::target_dir().join("debug").join("tactus"), &tactus)?;
+    shell::note(&format!("command: {}", tactus.display()));
+    Ok(tactus)
 }
 
 /// Fails if the `tactus` command, which has just been built, would be built once more: a build script that names a file
 /// which is not there makes cargo do so in every call.
 pub(crate) fn nothing_twice() -> Result<()> {
     shell::step("nothing is built twice");
-    let messages = shell::capture(optimised("build").args(["--quiet", "--bin", "tactus", "--message-format", "json"]))?;
+    let messages =
+        shell::capture(with_the_world("build").args(["--quiet", "--bin", "tactus", "--message-format", "json"]))?;
     match messages.lines().find(|message| message.contains("\"fresh\":false")) {
         None => Ok(()),
         Some(message) => bail!("built once more though nothing has changed: {message}"),

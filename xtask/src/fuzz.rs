@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use crate::{build, shell};
+use crate::shell;
 
 /// Number of frames of a run that does not say: what a change must pass.
 pub(crate) const USUAL: u32 = 1_000_000;
@@ -24,8 +24,9 @@ pub(crate) fn run(count: u32) -> Result<()> {
     shell::step(&format!("{count} random frames on link and bus, {} sessions", count / 10));
     for (target, name) in TESTS {
         shell::run(
-            build::optimised("test")
-                .args(["--quiet", "--test", target, name])
+            // As at the root, with the overflow checks of the development profile.
+            shell::cargo()
+                .args(["test", "--quiet", "--test", target, name])
                 .env("TACTUS_FUZZ_FRAMES", count.to_string())
                 .env("TACTUS_FUZZ_SESSIONS", (count / 10).to_string())
                 .env("TACTUS_FUZZ_STORIES", (count / 1000).to_string()),

@@ -89,7 +89,7 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
     build::host()?;
     shell::step("the hand image under QEMU: start-up, grip, costs");
     let printed = ["--", "--nocapture", "--test-threads", "1"];
-    shell::run(build::optimised("test").args(["--test", "system", "hand::"]).args(printed))?;
+    shell::run(build::with_the_world("test").args(["--test", "system", "hand::"]).args(printed))?;
     shell::step("accuracy against f64, saturation, ladder (development profile: integers that wrap are errors)");
     shell::run(shell::cargo().args(["test", "--test", "fixed"]).args(printed))
 }

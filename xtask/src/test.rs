@@ -13,8 +13,7 @@ pub(crate) fn run(machine: &Machine) -> Result<()> {
     emulated::build(machine.toolchain)?;
     build::host()?;
     shell::step("tests of all packages, whole-system tests included");
-    // Optimised: physics and the emulator's peer are several times faster, and the demo needs the same build.
-    shell::run(&mut build::optimised("test"))?;
+    shell::run(&mut build::with_the_world("test"))?;
     firmware()?;
     emulated::test()
 }
@@ -26,7 +25,7 @@ pub(crate) const WITH_THE_WORLD: [(&str, &str); 3] =
 /// The tests that `cargo test` at the root, which has no world, cannot have run.
 pub(crate) fn with_the_world() -> Result<()> {
     shell::step("tests with the MuJoCo world, whole-system tests included");
-    let mut cargo = build::optimised("test");
+    let mut cargo = build::with_the_world("test");
     // By name, because another selection of packages would build half of the house once more.
     cargo.arg("--lib").args(WITH_THE_WORLD.iter().flat_map(|(name, _)| ["--test", name]));
     shell::run(&mut cargo)
@@ -38,6 +37,6 @@ pub(crate) fn firmware() -> Result<()> {
     shell::step("tests of the firmware on this machine");
     // Selected with all the others, by name: by itself it would build them once more.
     let mut firmware = shell::cargo();
-    firmware.args(["test", "--release", "--workspace", "--features", build::WORLD]);
+    firmware.args(["test", "--workspace", "--features", build::WORLD]);
     shell::run(firmware.args(["--test", "lines", "--test", "stm32h743_numbers", "--test", "memory_board"]))
 }

@@ -299,7 +299,7 @@ impl SimulationOptions {
 
 /// An image or a program: named by the environment, or where `cargo xtask` leaves it; an error is where it should be.
 ///
-/// The build folder is found from the place of this program (`target/release/tactus`, `target/debug/deps/...`), so
+/// The build folder is found from the place of this program (`target/tools/tactus`, `target/debug/deps/...`), so
 /// that it does not matter where it is called from.
 fn find(variable: &str, file: &str) -> Result<PathBuf, PathBuf> {
     if let Some(path) = std::env::var_os(variable) {
