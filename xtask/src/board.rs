@@ -82,11 +82,15 @@ impl Board {
         }
     }
 
-    /// Profile of the build.
-    pub(crate) const fn profile(self) -> &'static str {
+    /// Level at which the image is optimised.
+    ///
+    /// At 3 the control slot of a run does not fit the real board's memory that is never waited for; at "s" it takes 3.4
+    /// times the instructions (docs/decisions/0021-four-hundred-megahertz.md). Not a profile of its own: all macros and
+    /// build scripts would be built once more for it.
+    pub(crate) const fn level(self) -> &'static str {
         match self {
-            Self::Mps2 => "firmware",
-            Self::Stm32h743 => "board",
+            Self::Mps2 => "profile.firmware.opt-level=3",
+            Self::Stm32h743 => "profile.firmware.opt-level=2",
         }
     }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result, bail, ensure};
+use link::ImageMetadata;
 
 use crate::board::{self, Board};
 use crate::elf::Sizes;
@@ -72,13 +73,18 @@ pub(crate) fn real_board(toolchain: Toolchain, board: Board) -> Result<PathBuf> 
 fn board_image(toolchain: Toolchain, board: Board, may_sleep: bool) -> Result<PathBuf> {
     shell::step(&format!("building the arm image for {board}"));
     let mut cargo = toolchain.cargo("build", ARM)?;
-    cargo.args(["--package", "firmware", "--bin", "arm", "--profile", board.profile()]).args([
+    cargo.args(["--package", "firmware", "--bin", "arm", "--profile", "firmware", "--config", board.level()]).args([
         "--no-default-features",
         "--features",
         board.features(may_sleep),
     ]);
     shell::run(&mut cargo)?;
-    let built = toolchain.output(ARM, board.profile()).join("arm");
+    let built = toolchain.output(ARM, "firmware").join("arm");
+    let sizes = Sizes::of(&built)?;
+    let described =
+        ImageMetadata::decode(sizes.description().context("the image does not say which board it is for")?)?;
+    // Cargo leaves the images of all boards at one place.
+    ensure!(described.simulated == (board == Board::Mps2), "an image for {} was built meanwhile", described.board);
     // One place whatever the toolchain, beside the tools that load it.
     let folder = shell::target_dir().join("images");
     fs::create_dir_all(&folder)?;

@@ -8,8 +8,11 @@ use fdcan_model::Cancellation;
 use puck::CanFrame;
 use sim::HOME;
 
-/// In service: the arm is ready long before.
-const SERVICE_US: u64 = 2_100_000;
+/// In service: the arm is ready.
+const SERVICE_US: u64 = 600_000;
+
+/// Somewhat later an arm whose host has it hold is under torque.
+const UNDER_TORQUE_US: u64 = 800_000;
 
 /// True if the four safe frames are among `sent`, in order, with nothing but their like between the first and the last.
 fn holds_safe_frames(sent: &[(u64, CanFrame)]) -> bool {
@@ -102,27 +105,26 @@ fn a_panic_while_the_controller_leaves_the_bus_sends_the_last_frames_when_it_is_
 
 #[test]
 fn d4_a_hard_fault_sends_the_last_frames_and_records_its_cause() {
-    let story = tell_with(2.2, &["hard-fault@2100000"]);
+    let story = tell_with(0.7, &["hard-fault@600000"]);
     ended_in_order(&story, SERVICE_US, "hard fault");
     assert!(story.log_says("0x00010000"), "CFSR: undefined instruction; {:#?}", story.log());
 }
 
 #[test]
 fn d5_a_stack_at_its_guard_sends_the_last_frames() {
-    let story = tell_with(2.2, &["guard@2100000"]);
+    let story = tell_with(0.7, &["guard@600000"]);
     ended_in_order(&story, SERVICE_US, "memory fault");
 }
 
 #[test]
 fn d4_a_non_maskable_interrupt_sends_the_last_frames() {
-    let story = tell_with(2.2, &["nmi@2100000"]);
+    let story = tell_with(0.7, &["nmi@600000"]);
     ended_in_order(&story, SERVICE_US, "non-maskable interrupt");
 }
 
 #[test]
 fn d4_an_image_that_ends_under_torque_gives_none_any_more_even_if_it_fails_twice() {
     // The arm holds; a second fault befalls the first while its last frames leave.
-    const UNDER_TORQUE_US: u64 = 3_000_000;
     let at = |kind: &str, after: u64| format!("{kind}@{}", UNDER_TORQUE_US + after);
     for (faults, words) in [
         (vec![at("panic", 0)], "called `Option::unwrap()` on a `None` value"),
@@ -132,7 +134,7 @@ fn d4_an_image_that_ends_under_torque_gives_none_any_more_even_if_it_fails_twice
         (vec![at("panic", 0), at("hard-fault", 150)], ""),
         (vec![at("hard-fault", 0), at("below-guard", 150)], ""),
     ] {
-        let story = tell_holding(3.5, &faults);
+        let story = tell_holding(1.3, &faults);
         let first = UNDER_TORQUE_US + if faults.len() == 1 { 0 } else { 150 };
         let before = story.sent_since(UNDER_TORQUE_US - 5_000);
         assert!(before.iter().any(|(at, frame)| *at < UNDER_TORQUE_US && is_torque(frame)), "{faults:?}: no torque");
@@ -148,7 +150,7 @@ fn d4_an_image_that_ends_under_torque_gives_none_any_more_even_if_it_fails_twice
 
 #[test]
 fn d3_a_hang_ends_by_the_watchdog() {
-    ended_by_watchdog(&tell_with(2.2, &["hang@2100000"]), SERVICE_US);
+    ended_by_watchdog(&tell_with(0.7, &["hang@600000"]), SERVICE_US);
 }
 
 #[test]
@@ -159,7 +161,7 @@ fn d3_a_hang_before_the_first_slot_ends_by_the_watchdog_as_fast() {
 
 #[test]
 fn d3_a_core_that_stands_still_is_reset_by_the_watchdog() {
-    ended_by_watchdog(&tell_with(2.2, &["stall@2100000:20000"]), SERVICE_US);
+    ended_by_watchdog(&tell_with(0.7, &["stall@600000:20000"]), SERVICE_US);
 }
 
 #[test]
@@ -174,7 +176,7 @@ fn d3_a_watchdog_that_does_not_take_its_window_lets_nothing_move() {
 
 #[test]
 fn d8_a_time_that_stands_still_stops_the_arm() {
-    let story = tell_holding(4.0, &["time-stands@3000000".into()]);
+    let story = tell_holding(1.8, &["time-stands@800000".into()]);
     assert!(story.resets().is_empty(), "{:?}", story.resets());
     let learned = story.learned.lock();
     let status = learned.status.as_ref().expect("a status");
@@ -184,15 +186,15 @@ fn d8_a_time_that_stands_still_stops_the_arm() {
 
 #[test]
 fn a_usb_controller_without_a_clock_costs_the_usb_line_and_nothing_else() {
-    let story = tell_with(2.6, &["usb-dead@0"]);
+    let story = tell_with(1.1, &["usb-dead@0"]);
     assert!(story.resets().is_empty(), "{:?}", story.resets());
     assert!(story.is_up(), "{:?}", story.learned.lock().status);
 }
 
 #[test]
 fn c3_a_usb_line_that_stays_up_keeps_the_session_from_nothing() {
-    let quiet = tell_with(3.1, &[]).learned.lock().answered;
-    let story = tell_with(3.1, &["usb-held@2100000"]);
+    let quiet = tell_with(1.6, &[]).learned.lock().answered;
+    let story = tell_with(1.6, &["usb-held@600000"]);
     assert!(story.resets().is_empty(), "{:?}", story.resets());
     let learned = story.learned.lock();
     assert!(learned.answered + 3 > quiet, "{} of {} questions, {quiet} without", learned.answered, learned.asked);
@@ -202,8 +204,8 @@ fn c3_a_usb_line_that_stays_up_keeps_the_session_from_nothing() {
 
 #[test]
 fn a_usb_queue_that_never_says_that_it_is_empty_costs_the_usb_line_and_nothing_else() {
-    let quiet = tell_with(3.1, &[]).learned.lock().answered;
-    let story = tell_with(3.1, &["usb-flush-held@2100000"]);
+    let quiet = tell_with(1.6, &[]).learned.lock().answered;
+    let story = tell_with(1.6, &["usb-flush-held@600000"]);
     assert!(story.resets().is_empty(), "{:?}", story.resets());
     let learned = story.learned.lock();
     assert!(learned.answered + 3 > quiet, "{} of {} questions, {quiet} without", learned.answered, learned.asked);
@@ -212,43 +214,42 @@ fn a_usb_queue_that_never_says_that_it_is_empty_costs_the_usb_line_and_nothing_e
 
 #[test]
 fn a_serial_line_that_says_for_good_that_a_byte_has_come_costs_that_line_and_nothing_else() {
-    let story = tell_holding(3.5, &["serial-held@3000000".into()]);
+    let story = tell_holding(1.3, &["serial-held@800000".into()]);
     assert!(story.resets().is_empty(), "{:?}", story.resets());
     // Nobody can ask any more: the arm is held by 300 cycles a second as before.
     let torques =
         |from: u64, to: u64| story.sent_since(from).iter().filter(|(at, frame)| *at < to && is_torque(frame)).count();
-    let (before, after) = (torques(2_900_000, 3_000_000), torques(3_400_000, 3_500_000));
+    let (before, after) = (torques(700_000, 800_000), torques(1_200_000, 1_300_000));
     assert!(before >= 29 && after.abs_diff(before) <= 2, "{before} torques in a tenth of a second, then {after}");
 }
 
 #[test]
 fn a_can_line_that_stays_up_ends_the_torque_and_the_session_answers() {
-    let story = tell_holding(4.0, &["can-held@3000000".into()]);
+    let story = tell_holding(1.8, &["can-held@800000".into()]);
     assert!(story.resets().is_empty(), "{:?}", story.resets());
     let learned = story.learned.lock();
     assert!(learned.answered + 3 > learned.asked, "{} of {} questions", learned.answered, learned.asked);
     assert_eq!(learned.fault_record.map(|record| record.fault), Some(12), "a fault of the bus");
-    assert!(!story.sent_since(3_100_000).iter().any(|(_, frame)| is_torque(frame)), "torque all the same");
+    assert!(!story.sent_since(900_000).iter().any(|(_, frame)| is_torque(frame)), "torque all the same");
 }
 
 #[test]
 fn a_second_reset_at_any_time_of_a_start_ends_the_torque_as_the_first_would_have() {
-    const RESET_US: u64 = 3_000_000;
     // In the copying before main, in the clock tree, in the set-up of the controllers, around the first frames.
     for after_us in [300, 2_500, 4_500, 6_000, 8_000] {
-        let resets = [format!("reset@{RESET_US}:pin"), format!("reset@{}:pin", RESET_US + after_us)];
-        let story = tell_holding(3.1, &resets);
+        let resets = [format!("reset@{UNDER_TORQUE_US}:pin"), format!("reset@{}:pin", UNDER_TORQUE_US + after_us)];
+        let story = tell_holding(0.9, &resets);
         assert_eq!(story.resets().len(), 2, "{after_us}: {:?}", story.resets());
-        begins_safely(&story, RESET_US + after_us);
-        assert!(!story.sent_since(RESET_US + 500).iter().any(|(_, frame)| is_torque(frame)), "{after_us}");
-        let first = story.sent_since(RESET_US + after_us)[0].0 - RESET_US - after_us;
+        begins_safely(&story, UNDER_TORQUE_US + after_us);
+        assert!(!story.sent_since(UNDER_TORQUE_US + 500).iter().any(|(_, frame)| is_torque(frame)), "{after_us}");
+        let first = story.sent_since(UNDER_TORQUE_US + after_us)[0].0 - UNDER_TORQUE_US - after_us;
         assert!(first < 12_000, "{after_us}: {first} us after the second one");
     }
 }
 
 #[test]
 fn after_bus_off_the_arm_is_started_up_again_and_nothing_stale_leaves() {
-    both_readings(4.2, &["bus-off@2100000"], |story| {
+    both_readings(2.7, &["bus-off@600000"], |story| {
         assert!(story.resets().is_empty(), "{:?}", story.resets());
         let learned = story.learned.lock();
         let statistics = learned.statistics.expect("statistics");
@@ -260,7 +261,7 @@ fn after_bus_off_the_arm_is_started_up_again_and_nothing_stale_leaves() {
 
 #[test]
 fn a_bus_without_another_node_is_borne_until_it_is_there_again() {
-    both_readings(4.2, &["no-acknowledge@2100000:200000"], |story| {
+    both_readings(2.7, &["no-acknowledge@600000:200000"], |story| {
         assert!(story.resets().is_empty(), "{:?}", story.resets());
         assert!(story.is_up(), "{:?}", story.learned.lock().status);
     });
@@ -268,7 +269,7 @@ fn a_bus_without_another_node_is_borne_until_it_is_there_again() {
 
 #[test]
 fn a_bus_held_dominant_is_borne_until_it_is_free() {
-    both_readings(4.2, &["dominant@2100000:50000"], |story| {
+    both_readings(2.7, &["dominant@600000:50000"], |story| {
         assert!(story.resets().is_empty(), "{:?}", story.resets());
         assert!(story.is_up(), "{:?}", story.learned.lock().status);
     });
@@ -277,9 +278,9 @@ fn a_bus_held_dominant_is_borne_until_it_is_free() {
 #[test]
 fn d7_every_kind_of_reset_is_told_by_its_name() {
     for (kind, words) in [("pin", "button"), ("power", "power"), ("brown-out", "power"), ("probe", "debug")] {
-        let story = tell_with(1.2, &[&format!("reset@1000000:{kind}")]);
+        let story = tell_with(0.8, &[&format!("reset@{SERVICE_US}:{kind}")]);
         assert_eq!(story.resets().len(), 1, "{kind}");
-        begins_safely(&story, 1_000_000);
+        begins_safely(&story, SERVICE_US);
         let log = story.log();
         let told = log.iter().rev().find(|line| line.contains(words));
         assert!(told.is_some(), "{kind}: no {words:?} in {log:#?}");
@@ -296,21 +297,24 @@ fn a_crystal_that_is_dead_from_the_start_does_not_leave_the_image_waiting_for_ev
 
 #[test]
 fn a_crystal_that_dies_under_torque_ends_the_torque_by_the_chips_own_oscillator() {
-    let story = tell_holding(3.9, &["hse-dead@3000000".into()]);
-    assert!(story.sent_since(2_990_000).iter().any(|(at, frame)| *at < 3_000_000 && is_torque(frame)), "no torque");
+    let story = tell_holding(1.7, &["hse-dead@800000".into()]);
+    assert!(
+        story.sent_since(UNDER_TORQUE_US - 10_000).iter().any(|(at, frame)| *at < UNDER_TORQUE_US && is_torque(frame)),
+        "no torque"
+    );
     let (reset_us, _) = story.resets()[0];
     let last = story.sent_since(reset_us);
     let frames: Vec<CanFrame> = last.iter().map(|(_, frame)| *frame).collect();
     // Once, and nothing else: the rate is not exact.
     assert_eq!(frames, safe_frames());
-    assert!(last.iter().all(|(at, _)| at - 3_000_000 < 12_000), "{last:?}");
+    assert!(last.iter().all(|(at, _)| at - UNDER_TORQUE_US < 12_000), "{last:?}");
     // It goes on trying as a board does that never had a clock.
     assert!(story.resets().len() >= 3, "{:?}", story.resets());
 }
 
 #[test]
 fn a_crystal_that_dies_in_service_ends_the_image_and_not_the_arm() {
-    let story = tell_with(2.2, &["hse-dead@2100000"]);
+    let story = tell_with(0.7, &["hse-dead@600000"]);
     let resets = story.resets();
     assert!(!resets.is_empty(), "it goes on at another rate");
     assert!(resets[0].0 - SERVICE_US < 12_000, "{resets:?}");
@@ -318,7 +322,7 @@ fn a_crystal_that_dies_in_service_ends_the_image_and_not_the_arm() {
 
 /// The image ends within a few hundredths of a second after a bit has fallen over, and its successor says which.
 fn ends_for_a_setting(fault: &str, address: &str) {
-    let story = tell_with(2.4, &[fault]);
+    let story = tell_with(0.9, &[fault]);
     let resets = story.resets();
     assert_eq!(resets.len(), 1, "{fault}: {resets:?}");
     let (reset_us, cause) = resets[0];
@@ -365,7 +369,7 @@ fn restarted(fault: &str, us: u64) -> Story {
 
 #[test]
 fn the_last_second_before_a_restart_is_kept_if_the_memory_has_kept_its_power() {
-    const RESTART_US: u64 = 2_400_000;
+    const RESTART_US: u64 = 900_000;
     const LATER_US: u64 = 100_000;
     let newest = |fault: &str, us: u64| {
         let story = restarted(fault, us);

@@ -7,7 +7,7 @@ use emulated_board::host::HOLD;
 use link::Refusal;
 
 /// The arm holds, and a weight has been kept.
-const HANGS_US: u64 = 3_000_000;
+const HANGS_US: u64 = 1_500_000;
 
 /// The first sector takes nothing any more, as against a change that is still under way.
 const FAILED: Option<(Refusal, u32)> = Some((Refusal::StoreWorn, 0));
@@ -16,7 +16,7 @@ const FAILED: Option<(Refusal, u32)> = Some((Refusal::StoreWorn, 0));
 fn c5_a_flash_operation_that_never_ends_is_told_and_the_arm_holds_on() {
     // The first word of a change, and one in its middle.
     for operation in [0, 3] {
-        let story = tell_keeping(4.0, &[format!("flash-hangs@{HANGS_US}:{operation}")]);
+        let story = tell_keeping(2.5, &[format!("flash-hangs@{HANGS_US}:{operation}")]);
         assert!(story.resets().is_empty(), "{operation}: {:?}", story.resets());
         let findings = story.outcome.measured.findings.all();
         assert!(!findings.iter().any(|finding| finding.register == "bank 2"), "{operation}: {findings:#?}");
@@ -34,13 +34,13 @@ fn c5_a_flash_operation_that_never_ends_is_told_and_the_arm_holds_on() {
         let statistics = learned.statistics.expect("statistics");
         assert_eq!((statistics.missed_deadlines, statistics.lost_replies), (0, 0), "{operation}");
         drop(learned);
-        assert!(story.sent_since(3_990_000).iter().any(|(_, frame)| is_torque(frame)), "{operation}: no torque");
+        assert!(story.sent_since(2_490_000).iter().any(|(_, frame)| is_torque(frame)), "{operation}: no torque");
     }
 }
 
 #[test]
 fn c5_a_restart_trusts_a_flash_again_that_hung() {
-    let story = tell_keeping(6.5, &[format!("flash-hangs@{HANGS_US}:0"), "reset@3500000:pin".into()]);
+    let story = tell_keeping(4.0, &[format!("flash-hangs@{HANGS_US}:0"), "reset@2000000:pin".into()]);
     assert_eq!(story.resets().len(), 1, "{:?}", story.resets());
     let learned = story.learned.lock();
     let kept = |answer: &&Option<(Refusal, u32)>| answer.is_none();
@@ -54,7 +54,7 @@ fn c5_a_restart_trusts_a_flash_again_that_hung() {
 #[test]
 fn a_bank_that_does_not_do_what_it_is_told_is_told_of_and_the_arm_holds_on() {
     for fault in ["flash-locked", "flash-deaf"] {
-        let story = tell_keeping(4.0, &[format!("{fault}@{HANGS_US}")]);
+        let story = tell_keeping(2.5, &[format!("{fault}@{HANGS_US}")]);
         assert!(story.resets().is_empty(), "{fault}: {:?}", story.resets());
         let learned = story.learned.lock();
         assert_eq!(learned.kept.first(), Some(&None), "{fault}: it is kept before");

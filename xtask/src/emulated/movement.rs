@@ -52,12 +52,13 @@ impl Bench<'_> {
 
     /// Plays the movement on a board with a blank bank 2; gives what `tactus` and what the emulator report.
     fn play(&self, name: &str) -> Result<(Value, Value)> {
-        let (bank, file) = (format!("{name}.bank2"), format!("{name}.json"));
-        for old in [&bank, &file] {
+        let [bank, file, recording] = ["bank2", "json", "csv"].map(|kind| format!("{name}.{kind}"));
+        for old in [&bank, &file, &recording] {
             let _ = fs::remove_file(self.folder.join(old));
         }
         let device = format!("board:seed=7,flash={bank},report={file}");
-        let run = object(&mut self.command(&["--json", "--quiet", "--device", &device, "run", "grasp.toml"]))?;
+        let words = ["--json", "--quiet", "--device", &device, "run", "grasp.toml", "--record", &recording];
+        let run = object(&mut self.command(&words))?;
         let text = fs::read_to_string(self.folder.join(&file)).with_context(|| format!("there is no {file}"))?;
         Ok((run, serde_json::from_str(&text)?))
     }
@@ -87,9 +88,11 @@ pub(super) fn play(table: &mut Table, emulator: &Path, image: &Path, tactus: &Pa
     let same = one.is_some() && one == other;
     let missing = || "missing".to_owned();
     table.checked("bus hash", one.unwrap_or_else(missing), other.unwrap_or_else(missing), same);
-    let banks = [fs::read(bench.folder.join("first.bank2"))?, fs::read(bench.folder.join("second.bank2"))?];
-    let equal = banks[0] == banks[1];
-    table.checked("bank 2 of both runs", if equal { "equal" } else { "different" }, "equal", equal);
+    for (what, kind) in [("bank 2 of both runs", "bank2"), ("recordings of both runs", "csv")] {
+        let read = |name: &str| fs::read(bench.folder.join(format!("{name}.{kind}")));
+        let equal = read("first")? == read("second")?;
+        table.checked(what, if equal { "equal" } else { "different" }, "equal", equal);
+    }
     restart(table, &bench)
 }
 

@@ -29,14 +29,15 @@ pub(crate) fn image() -> Arc<Image> {
     Arc::new(Image::read(&image_path()).expect("an image of this board"))
 }
 
-/// An arm that somebody switches on and activates, in the simplest world.
+/// An arm in the simplest world that was up before the board came on, and that somebody activates at once: it is ready
+/// after 0.57 s, and one that has yet to be switched on, as in `check`, after 2.13 s.
 pub(crate) fn plant() -> Plant {
-    with_operator(OperatorConfig::default())
+    with_operator(OperatorConfig::prompt())
 }
 
 /// The same with a person who does this.
 fn with_operator(operator: OperatorConfig) -> Plant {
-    Plant::new(PlantConfig { operator, ..PlantConfig::default() }, Box::new(FreeJoints::new(HOME)))
+    Plant::new(PlantConfig { started: true, operator, ..PlantConfig::default() }, Box::new(FreeJoints::new(HOME)))
 }
 
 /// A host that asks, and keeps every frame of the arm's bus.
@@ -120,7 +121,7 @@ pub(crate) fn tell_armed_again(seconds: f64, setup: Setup, again_us: u64) -> Sto
     let at = again_us * TICKS_PER_MICROSECOND;
     let later = at + TICKS_PER_SECOND / 10;
     let script = vec![(at, PendantAction::ShiftIdle), (later, PendantAction::ShiftActivate)];
-    let plant = with_operator(OperatorConfig { script, ..OperatorConfig::default() });
+    let plant = with_operator(OperatorConfig { script, ..OperatorConfig::prompt() });
     tell_to(seconds, setup, plant, Inquirer::holding)
 }
 
