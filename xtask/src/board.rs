@@ -84,9 +84,9 @@ impl Board {
 
     /// Level at which the image is optimised.
     ///
-    /// At 3 the control slot of a run does not fit the real board's memory that is never waited for; at "s" it takes 3.4
-    /// times the instructions (docs/decisions/0021-four-hundred-megahertz.md). Not a profile of its own: all macros and
-    /// build scripts would be built once more for it.
+    /// At 3 the control slot of a run does not fit the real board's memory that is never waited for; at "s" it takes
+    /// 3.4 times the instructions (docs/decisions/0021-four-hundred-megahertz.md). Not a profile of its own: all macros
+    /// and build scripts would be built once more for it.
     pub(crate) const fn level(self) -> &'static str {
         match self {
             Self::Mps2 => "profile.firmware.opt-level=3",
