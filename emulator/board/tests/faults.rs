@@ -8,7 +8,7 @@ use fdcan_model::Cancellation;
 use puck::CanFrame;
 use sim::HOME;
 
-/// In service: the arm is ready.
+/// In service: the arm is ready, since 0.03 s.
 const SERVICE_US: u64 = 600_000;
 
 /// Somewhat later an arm whose host has it hold is under torque.
