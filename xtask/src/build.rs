@@ -84,7 +84,11 @@ fn board_image(toolchain: Toolchain, board: Board, may_sleep: bool) -> Result<Pa
     let described =
         ImageMetadata::decode(sizes.description().context("the image does not say which board it is for")?)?;
     // Cargo leaves the images of all boards at one place.
-    ensure!(described.simulated == (board == Board::Mps2), "an image for {} was built meanwhile: try again", described.board);
+    ensure!(
+        described.simulated == (board == Board::Mps2),
+        "an image for {} was built meanwhile: try again",
+        described.board
+    );
     // One place whatever the toolchain, beside the tools that load it.
     let folder = shell::target_dir().join("images");
     fs::create_dir_all(&folder)?;
