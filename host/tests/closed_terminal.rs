@@ -53,6 +53,20 @@ fn until(shown: &mut ChildStdout, words: &str) {
     }
 }
 
+/// Waits until every thread of the only child of this process is stopped. The shell has the terminal before: a thread
+/// that waits in `read` still gets what is typed until its stop has reached it, and no person types so soon.
+fn until_its_child_is_stopped(process: &str) {
+    let child = std::fs::read_to_string(format!("/proc/{process}/task/{process}/children")).unwrap();
+    let tasks = format!("/proc/{}/task", child.trim());
+    let is_stopped = |thread: std::io::Result<std::fs::DirEntry>| {
+        let told = std::fs::read_to_string(thread.unwrap().path().join("stat")).unwrap();
+        told.rsplit_once(')').unwrap().1.trim_start().starts_with('T')
+    };
+    while !std::fs::read_dir(&tasks).unwrap().all(is_stopped) {
+        std::thread::yield_now();
+    }
+}
+
 /// Ctrl-Z did nothing in the monitor; stopped from outside, it drew later only what had changed. Whatever has started
 /// the monitor (`cargo run`, here a shell) is stopped with it: else nobody gets the terminal.
 #[test]
@@ -70,14 +84,16 @@ fn a_monitor_that_is_suspended_gives_the_terminal_to_the_shell_and_draws_all_of_
     let mut terminal = terminal.expect("`script` has to be installed: package bsdutils");
     let (mut typed, mut shown) = (terminal.stdin.take().unwrap(), terminal.stdout.take().unwrap());
     until(&mut shown, "joints");
+    let process = std::fs::read_to_string(folder.path().join("pid")).unwrap();
     typed.write_all(b"\x1a").unwrap();
     until(&mut shown, "shell 42");
+    until_its_child_is_stopped(process.trim());
     typed.write_all(b"\n").unwrap();
     // What never changes is drawn once more.
     until(&mut shown, "joints");
-    let process = std::fs::read_to_string(folder.path().join("pid")).unwrap();
     assert!(Command::new("kill").args(["-STOP", "--", &format!("-{}", process.trim())]).status().unwrap().success());
     until(&mut shown, "shell 64");
+    until_its_child_is_stopped(process.trim());
     typed.write_all(b"\n").unwrap();
     until(&mut shown, "joints");
     typed.write_all(b"Q").unwrap();
