@@ -51,9 +51,10 @@ impl Brakes {
         self.wanted = wanted;
     }
 
-    /// True while the control cycle wants the safety module to go to IDLE.
-    pub(super) fn are_wanted(&self) -> bool {
-        self.wanted
+    /// True while the control cycle wants the safety module to go to IDLE, and while a request for that which nobody
+    /// wants any more may still be answered.
+    pub(super) fn are_asked_for(&self) -> bool {
+        self.wanted || self.request_in > 0
     }
 
     /// A puck (0..=6) has told if it brakes; `active`: while the safety module is ACTIVE.

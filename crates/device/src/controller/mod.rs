@@ -234,7 +234,7 @@ impl DeviceController {
         self.fresh_safety = Some(mode);
         self.brakes.hear_safety(mode);
         if self.safety_mode != Some(mode) {
-            let is_asked_for = mode == SafetyMode::Idle && self.brakes.are_wanted();
+            let is_asked_for = mode == SafetyMode::Idle && self.brakes.are_asked_for();
             self.safety_mode = Some(mode);
             self.tell(EventKind::Safety { mode, is_asked_for }, io);
         }

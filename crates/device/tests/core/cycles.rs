@@ -264,6 +264,33 @@ fn g7_an_activation_that_is_taken_back_because_the_arm_falls_is_told_as_the_devi
     assert_eq!(idle_is_asked_for(0), Some(false));
 }
 
+/// Seen: the arm was in fault, a person pressed Shift-Activate and had the fault cleared while the device's request to
+/// brake was on its way: IDLE came without a word of whose wish it was. The change that makes it fail: only a request
+/// that is still wanted when the module tells its mode counts.
+#[test]
+fn g7_idle_that_a_clear_has_overtaken_is_told_as_the_devices_own_wish() {
+    let (mut core, mut bus) = floating();
+    bus.refuse_torques = true;
+    bus.run(&mut core, 0.5);
+    bus.refuse_torques = false;
+    bus.run(&mut core, 0.5);
+    assert_eq!((core.health().state, bus.safety_mode), (State::Fault, SafetyMode::Idle));
+    bus.press_activate();
+    let is_request = |set: (u64, Destination, PropertyId, i32)| {
+        set.1 == Destination::Node(Node::SAFETY_MODULE) && set.2 == PropertyId::MODE
+    };
+    let before = bus.sets().filter(|set| is_request(*set)).count();
+    while bus.sets().filter(|set| is_request(*set)).count() == before {
+        bus.run_slots(&mut core, 1);
+    }
+    bus.commands.push_back(Command::ClearFault.into());
+    let heard = bus.events.len();
+    bus.run(&mut core, 0.1);
+    assert_eq!((core.health().state, bus.safety_mode), (State::Idle, SafetyMode::Idle), "{:?}", bus.events);
+    let told = &bus.events[heard..];
+    assert!(told.contains(&EventKind::Safety { mode: SafetyMode::Idle, is_asked_for: true }), "{told:?}");
+}
+
 #[test]
 fn g7_brakes_are_asked_for_every_20_ms_until_they_are_on_even_if_the_module_was_misheard() {
     let (mut core, mut bus) = floating();
