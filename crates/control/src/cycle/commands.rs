@@ -84,7 +84,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 let waits = matches!(self.supervisor.state(), State::SoftStop | State::Fault);
                 let moving = waits && self.fastest(measured) > R::constant(STANDING);
                 let remains = measured.outside_fault || measured.state.missing > 0 || moving;
-                if (waits || self.needs_clear()) && remains {
+                // Nobody can know of a fault that this very cycle has brought.
+                let is_new = self.supervisor.fault() != measured.fault_before;
+                if is_new || (waits || self.needs_clear()) && remains {
                     return Err(Refusal::CauseRemains);
                 }
                 self.change(Trigger::Clear, measured)

@@ -280,7 +280,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if senses == Senses::Fresh {
             self.wrench.follow(drift, &measured.wrench, (run.deviation(), run.has_ended()), measured.frames);
             if let Some(surprise) = run.watch(primitive, &measured.wrench, hand) {
-                self.pending = Some(Event::Surprised { phase: surprise.progress, channel: surprise.channel });
+                self.news.tell(Event::Surprised { phase: surprise.progress, channel: surprise.channel });
             }
         }
         let deviation = run.steadied().filter(|_| options.force_control);

@@ -21,7 +21,7 @@ use crate::act::limit::{LimitReport, TorqueLimiter};
 use crate::command::Refusal;
 use crate::cycle::hand::HandDrive;
 use crate::cycle::law::{Lag, Law, Posture, Running};
-use crate::cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, flags, limit_flags};
+use crate::cycle::record::{CycleInput, CycleOutput, CycleRecord, Event, News, flags, limit_flags};
 use crate::guard::disagreement::{Effort, Plan};
 use crate::guard::fault::{Fault, ReactionOutside};
 use crate::guard::joint_limits::JointBounds;
@@ -99,7 +99,7 @@ pub struct Cycle<R: Real, const N: usize = MAX_KERNELS> {
     cut: LimitReport,
     /// The part of the last torque that the model does not explain (N m): feedback, contact, and what it does not know.
     beyond: Vector7<R>,
-    pending: Option<Event>,
+    news: News,
     caution: Caution,
 }
 
@@ -123,6 +123,8 @@ struct Measured<'a, R: Real> {
     wrench: Wrench<R>,
     /// True while the caller reports a fault of its own.
     outside_fault: bool,
+    /// The fault that was latched before this cycle.
+    fault_before: Fault,
 }
 
 impl<R: Real, const N: usize> Cycle<R, N> {
@@ -152,7 +154,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
             armed_for: 0,
             cut: LimitReport::default(),
             beyond: Vector7::zeros(),
-            pending: None,
+            news: News::default(),
             caution: Caution::None,
             weight: WeightCorrection::none(calibration.payload),
             calibration,
@@ -355,6 +357,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                     pose: frames.tool_pose(),
                     wrench: self.wrench.wrench(&frames),
                     outside_fault: input.external_fault.is_some(),
+                    fault_before: before.1,
                 };
                 // A model lets an arm fall that friction or brakes hold while the torque of gravity builds up.
                 if self.supervisor.state().has_torque() && self.armed_for >= BUILDING_UP {
@@ -374,13 +377,10 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         record.flags |= self.standing_flags();
         // A run's last transition is told as `Arrived` by `act`; every other change is told here.
         if (self.supervisor.law(), record.fault) != before && record.flags & flags::ARRIVED == 0 {
-            self.pending = Some(Event::Entered(self.supervisor.law(), record.fault));
+            self.news.tell(Event::Entered(self.supervisor.law(), record.fault));
         }
-        let event = match answer {
-            Some(Ok(())) => Some(Event::Accepted),
-            Some(Err(reason)) => Some(Event::Refused(reason)),
-            None => self.pending.take(),
-        };
+        let answer = answer.map(|answer| answer.map_or_else(Event::Refused, |()| Event::Accepted));
+        let event = answer.or_else(|| self.news.next());
         CycleOutput { actuation, record, event }
     }
 
@@ -515,7 +515,7 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if self.is_over(measured) {
             self.trigger(Trigger::Arrived, Fault::None, Some(measured));
             record.flags |= flags::ARRIVED;
-            self.pending = Some(Event::Arrived);
+            self.news.tell(Event::Arrived);
         }
         let mut actuation = Actuation::torque(&torques, &self.calibration);
         let fault = self.supervisor.fault();

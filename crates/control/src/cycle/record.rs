@@ -1,5 +1,7 @@
 //! Input, output and record of one control cycle.
 
+use heapless::Deque;
+
 use crate::act::actuation::Actuation;
 use crate::act::limit::LimitReport;
 use crate::command::{Command, Refusal};
@@ -50,6 +52,28 @@ pub enum Event {
         /// The channel that stands out most: force x, y, z, torque x, y, z, gauges F1 to F3, fingers F1 to F3.
         channel: u8,
     },
+}
+
+/// Events that have yet to be told: an answer goes before them, and there is one in each cycle at most.
+#[derive(Clone, Debug, Default)]
+pub(super) struct News(Deque<Event, 4>);
+
+impl News {
+    /// Has an event told in its turn. Where there is no room the oldest gives way.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn tell(&mut self, event: Event) {
+        if self.0.is_full() {
+            self.0.pop_front();
+        }
+        // There is room now.
+        let _ = self.0.push_back(event);
+    }
+
+    /// The event whose turn it is.
+    pub(super) fn next(&mut self) -> Option<Event> {
+        self.0.pop_front()
+    }
 }
 
 /// Flags of a [`CycleRecord`], one bit each.

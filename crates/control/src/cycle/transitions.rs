@@ -3,6 +3,7 @@
 use crate::act::limit::LimitReport;
 use crate::command::RunOptions;
 use crate::cycle::law::{Lag, Law, Leaning, Lowering, Posture, Ramp, Running};
+use crate::cycle::record::Event;
 use crate::cycle::{BRAKE_WORDS, Caution, Cycle, HANDOVER, Measured, STOP_RAMP, ZERO_CYCLES};
 use crate::guard::fault::Fault;
 use crate::guard::joint_limits::JointBounds;
@@ -31,6 +32,13 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         if let Ok(true) = self.supervisor.take(trigger, fault) {
             self.entered(measured);
         }
+    }
+
+    /// The oldest event that has yet to be told, for a caller who will not come back soon: who ends the cycles has each
+    /// of them told.
+    #[cold]
+    pub fn untold(&mut self) -> Option<Event> {
+        self.news.next()
     }
 
     /// Begins the law of the state that was just entered; an approach and a run are begun by [`Cycle::begin_approach`]

@@ -2,6 +2,7 @@
 
 mod adaptation;
 mod arriving;
+mod at_once;
 mod authority;
 mod caution;
 mod contact;
