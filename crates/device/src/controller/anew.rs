@@ -1,5 +1,6 @@
 //! Between the start-up and the cyclic loop: how the one hands the bus to the other.
 
+use crate::application::ControllerIo;
 use crate::background::BackgroundPoll;
 use crate::health::Counters;
 use crate::round::Round;
@@ -46,6 +47,15 @@ impl DeviceController {
         self.startup.restart(now_us, self.cycle.last_counts());
         self.cycle.reset();
         self.suspend_hand();
+    }
+
+    /// Tells what waits behind the answers to commands: the next cycle may be minutes away.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn tell_the_rest(&mut self, io: &mut impl ControllerIo<Self>) {
+        while let Some(event) = self.cycle.untold() {
+            self.tell(event.into(), io);
+        }
     }
 
     /// The bus is searched anew, also where a zeroing out of the loop has failed: what the loop knew of the hand is no

@@ -352,6 +352,9 @@ impl DeviceController {
             self.tell(event.into(), io);
         }
         self.leave_if_lost(now_us);
+        if matches!(self.phase, BusPhase::StartUp) {
+            self.tell_the_rest(io);
+        }
     }
 
     /// A reason against torque that lasts.

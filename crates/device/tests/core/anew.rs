@@ -84,6 +84,27 @@ fn a_refusal_in_the_very_cycle_in_which_the_bus_is_started_anew_is_told() {
     assert!((10..140).contains(&restarts), "it comes before and after: {restarts}");
 }
 
+/// Seen: a command was answered in the cycle in which the device heard of the emergency stop, and the bus was started
+/// anew before the next one: that the arm had lost its torque was told when somebody had released the stop, minutes
+/// later, or never. The change that makes it fail: the bus is started anew with news that has not been told.
+#[test]
+fn an_emergency_stop_that_meets_a_command_is_told_at_once() {
+    for slots in 0..12 {
+        let (mut core, mut bus) = floating();
+        bus.run_slots(&mut core, slots);
+        bus.press_emergency_stop();
+        let before = bus.events.len();
+        // One in every cycle, more than there are until the bus is started anew.
+        bus.commands.extend([Command::from(control::Command::Gravity); 8]);
+        bus.run(&mut core, 0.1);
+        let told = &bus.events[before..];
+        let place = |event| told.iter().position(|told| *told == event);
+        let dropped = place(EventKind::Entered(control::State::Idle, control::Fault::SafetyDropped));
+        let begun = place(EventKind::Startup(Stage::Enumerating));
+        assert!(dropped.is_some() && begun.is_some() && dropped < begun, "after {slots} slots: {told:?}");
+    }
+}
+
 /// The same where a start-up that has failed begins anew. The change that makes it fail: it forgets the answer.
 #[test]
 fn a_refusal_in_the_very_slot_in_which_a_start_up_begins_anew_is_told() {
