@@ -445,10 +445,11 @@ impl DeviceController {
         let absent = (missing || silent, digit.or_else(|| self.hand.puck_in_doubt(self.number, rests)));
         let question = match (poll.begin(), self.round.suspect()) {
             (Some(safety), _) => Some(safety),
-            (None, Some(node)) => Some(poll.suspect(node)),
-            (None, None) if self.hand.act(&mut outlet) => None,
-            (None, None) if self.brakes.look(self.safety_mode) => Some(poll.first_mode()),
-            (None, None) => poll.other(self.hand.answers_questions(), absent, self.brakes.suspect()),
+            // A hand that drives on goes before a puck that is silent.
+            (None, Some(node)) if !self.hand.has_word() => Some(poll.suspect(node)),
+            (None, _) if self.hand.act(&mut outlet) => None,
+            (None, _) if self.brakes.look(self.safety_mode) => Some(poll.first_mode()),
+            (None, _) => poll.other(self.hand.answers_questions(), absent, self.brakes.suspect()),
         };
         if let Some(frame) = question {
             outlet.send(frame);

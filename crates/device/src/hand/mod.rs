@@ -228,6 +228,11 @@ impl Hand {
         }
     }
 
+    /// True if its drives have yet to be told a mode, to brake for one.
+    pub(crate) fn has_word(&self) -> bool {
+        self.properties.is_some() && self.initialisation.is_none() && self.drive.mode_frame().is_some()
+    }
+
     /// A slow slot that the hand may use; whether it did.
     pub(crate) fn act(&mut self, outlet: &mut impl Outlet) -> bool {
         let Some(properties) = self.properties else {

@@ -481,6 +481,25 @@ fn g11_a_digit_that_misses_the_word_to_brake_of_a_stop_is_told_again() {
     }
 }
 
+/// Seen: while a puck of the arm was silent, the questions to it took every slot that the hand could have had; a stop
+/// was accepted, and the digits drove on until the bus was started anew, up to a second later. The change that makes it
+/// fail: a puck that is silent is asked before the hand is told to brake.
+#[test]
+fn a_stop_reaches_a_hand_that_moves_while_a_puck_of_the_arm_is_silent() {
+    for silent_for in [10, 30, 100, 300] {
+        let (mut core, mut bus) = holding_with_hand();
+        bus.commands.push_back(Command::InitialiseHand);
+        bus.run(&mut core, 0.5);
+        bus.pucks[3].lose = u32::MAX;
+        bus.run_slots(&mut core, silent_for);
+        assert!(bus.digits[..3].iter().all(|digit| digit.mode != MotorMode::Idle), "{silent_for} slots");
+        bus.commands.push_back(Control::Stop.into());
+        bus.run(&mut core, 0.03);
+        assert_eq!(core.health().hand, HandStage::NotInitialised, "{silent_for} slots: {:?}", bus.events);
+        assert!(bus.digits.iter().all(|digit| digit.mode == MotorMode::Idle), "{silent_for} slots: they drive on");
+    }
+}
+
 /// The same of a hand that fails under torque: pucks keep the last torque that they were sent.
 #[test]
 fn a_digit_that_misses_the_word_to_brake_of_a_hand_that_fails_is_told_again() {
