@@ -41,10 +41,10 @@ impl<A: Application> HostSession<A> {
         if offset != upload.received {
             return Err((Refusal::UploadOrder, [upload.received, offset]));
         }
-        let end = u32::try_from(data.len()).ok().and_then(|length| offset.checked_add(length));
-        let Some(end) = end.filter(|end| *end <= upload.length) else {
-            return Err((Refusal::ImageTooLarge, [offset.saturating_add(192), upload.length]));
-        };
+        let end = u32::try_from(data.len()).map_or(u32::MAX, |length| offset.saturating_add(length));
+        if end > upload.length {
+            return Err((Refusal::ImageTooLarge, [end, upload.length]));
+        }
         self.application.write(offset, data)?;
         upload.received = end;
         Ok(())
