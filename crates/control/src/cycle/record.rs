@@ -1,7 +1,5 @@
 //! Input, output and record of one control cycle.
 
-use heapless::Deque;
-
 use crate::act::actuation::Actuation;
 use crate::act::limit::LimitReport;
 use crate::command::{Command, Refusal};
@@ -54,25 +52,30 @@ pub enum Event {
     },
 }
 
-/// Events that have yet to be told: an answer goes before them, and there is one in each cycle at most.
-#[derive(Clone, Debug, Default)]
-pub(super) struct News(Deque<Event, 4>);
+/// Events that have yet to be told, the oldest first: an answer goes before them, and there is one in each cycle at
+/// most.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct News([Option<Event>; 4]);
 
 impl News {
     /// Has an event told in its turn. Where there is no room the oldest gives way.
-    #[cold]
-    #[inline(never)]
     pub(super) fn tell(&mut self, event: Event) {
-        if self.0.is_full() {
-            self.0.pop_front();
+        match self.0.iter_mut().find(|place| place.is_none()) {
+            Some(place) => *place = Some(event),
+            None => {
+                self.next();
+                self.0[3] = Some(event);
+            }
         }
-        // There is room now.
-        let _ = self.0.push_back(event);
     }
 
     /// The event whose turn it is.
     pub(super) fn next(&mut self) -> Option<Event> {
-        self.0.pop_front()
+        let [first, rest @ ..] = self.0;
+        if first.is_some() {
+            self.0 = [rest[0], rest[1], rest[2], None];
+        }
+        first
     }
 }
 
