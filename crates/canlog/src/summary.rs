@@ -94,6 +94,11 @@ impl InterfaceTotals {
         }
     }
 
+    /// The clock of the log was set: no cycle is measured over that.
+    pub fn leap(&mut self) {
+        self.cycle.last_us = None;
+    }
+
     /// Questions and answers.
     fn follow(&mut self, now_us: u64, frame: &CanFrame) {
         if frame.can_id().sender() != Node::HOST {

@@ -72,6 +72,9 @@ pub struct Sum<'a> {
     pub interfaces: &'a [Summary],
     /// Lines that are not in candump's format.
     pub unreadable_lines: u64,
+    /// How often time goes back by more than a second: the clock was set back, or these are several logs. The times
+    /// behind it count from there on.
+    pub times_set_back: u64,
     /// Segments of the host's link that are missing.
     pub link_segment_gaps: u32,
     /// Messages of the link that were damaged.
@@ -89,9 +92,14 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let mut out = Printer::new(global.output(), !command.summary);
     let mut reader = Reader::default();
     let mut totals: Vec<InterfaceTotals> = Vec::new();
+    let mut clock = Clock::default();
     let garbage = source.read(&interrupt, DOING, |heard| {
         // Whoever looks on wants to see what there is, and not what fills a buffer.
-        let Some((_, line)) = heard else { return out.flush() };
+        let Some((number, mut line)) = heard else { return out.flush() };
+        if let Some(said) = clock.put_forward(number, &mut line) {
+            totals.iter_mut().for_each(InterfaceTotals::leap);
+            global.output().warn(said);
+        }
         if command.interface.as_deref().is_some_and(|only| *only != *line.interface) {
             return Ok(true);
         }
@@ -109,8 +117,41 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let summaries: Vec<Summary> =
         seen.iter().map(|(interface, totals)| totals.sum(&interface.name, &interface.decoder)).collect();
     let damage: Vec<(u32, u32)> = seen.iter().map(|(interface, _)| interface.link.damage()).collect();
-    out.summaries(&summaries, &damage, garbage.lines)?;
+    out.summaries(&summaries, &damage, garbage.lines, clock.set_back)?;
     garbage.cause().map_or(Ok(()), |cause| Err(Failure::new(ErrorCode::LogLines, DOING, cause)))
+}
+
+/// Farthest that a line may lie before the latest one, us: interfaces are not always logged in order.
+const LONGEST_STEP_BACK_US: u64 = 1_000_000;
+
+/// The time of a log whose clock was set back, or which is several logs one behind the other: it goes on.
+#[derive(Debug, Default)]
+struct Clock {
+    /// Latest time as the log has it, and as it counts, us.
+    latest_us: (u64, u64),
+    /// Added to the times of the log, us.
+    added_us: u64,
+    /// How often it was set back.
+    set_back: u64,
+}
+
+impl Clock {
+    /// Lets the time of a line go on; words for whoever reads if the log's does not.
+    fn put_forward(&mut self, number: u64, line: &mut LogLine) -> Option<String> {
+        let (at, (latest, counted)) = (line.time_us, self.latest_us);
+        let is_back = latest.saturating_sub(at) > LONGEST_STEP_BACK_US;
+        if is_back {
+            self.added_us = counted.saturating_sub(at);
+            self.set_back += 1;
+            self.latest_us.0 = at;
+        }
+        line.time_us = at.saturating_add(self.added_us);
+        self.latest_us = (self.latest_us.0.max(at), counted.max(line.time_us));
+        is_back.then(|| {
+            let (from, to) = (latest as f64 * 1e-6, at as f64 * 1e-6);
+            format!("line {number}: time goes back from {from:.6} s to {to:.6} s: the clock was set back, or this is another log; what follows counts from there on")
+        })
+    }
 }
 
 /// Writes lines until nobody reads them any more.
@@ -148,13 +189,20 @@ impl Printer {
         self.write(&text)
     }
 
-    fn summaries(&mut self, summaries: &[Summary], damage: &[(u32, u32)], garbage: u64) -> Result<(), Failure> {
+    fn summaries(
+        &mut self,
+        summaries: &[Summary],
+        damage: &[(u32, u32)],
+        garbage: u64,
+        times_set_back: u64,
+    ) -> Result<(), Failure> {
         if self.output.json {
             let gaps: u32 = damage.iter().map(|(gaps, _)| gaps).sum();
             let bad: u32 = damage.iter().map(|(_, bad)| bad).sum();
             let summary = Sum {
                 interfaces: summaries,
                 unreadable_lines: garbage,
+                times_set_back,
                 link_segment_gaps: gaps,
                 link_damaged_messages: bad,
             };
