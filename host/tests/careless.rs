@@ -506,3 +506,17 @@ fn a_run_that_missed_its_goal_is_no_success_and_its_report_says_so() {
     let page = std::fs::read_to_string(at.join("report.html")).unwrap();
     assert!(page.contains("away from its goal") && !page.contains("arrived, and held"), "the report tells it");
 }
+
+/// Seen: a spring of 0.05 passed the check of the option, which said that every number above 0 is taken; the fit then
+/// failed with the advice to show the movement again.
+#[test]
+fn a_spring_that_no_primitive_can_have_is_refused_by_the_name_of_its_option() {
+    let folder = learned(3.0);
+    for option in ["--stiffness", "--orientation-stiffness"] {
+        let (exit, code, message, _) =
+            refused(folder.path(), &format!("--force learn demo.csv -o soft.toml {option} 0.05"));
+        assert_eq!((exit, code.as_str()), (2, "E221"), "{message}");
+        assert!(message.contains(option) && message.contains("from 0.1 to"), "{message}");
+        succeeds(folder.path(), &format!("--force learn demo.csv -o soft.toml {option} 0.1"));
+    }
+}

@@ -302,6 +302,9 @@ fn moving_ends(speed: &[f64]) -> impl Iterator<Item = String> {
     })
 }
 
+/// Softest spring that a primitive can have.
+const SOFTEST: f64 = 0.1;
+
 /// Refuses values that are out of range.
 fn check_options(options: &LearnOptions) -> Result<(), LearnError> {
     let wrong = |option: &'static str, reason: &str| Err(LearnError::Option { option, reason: reason.to_owned() });
@@ -325,12 +328,12 @@ fn check_options(options: &LearnOptions) -> Result<(), LearnError> {
         return wrong("--cutoff", &format!("a frequency between 0 and {highest} Hz is expected; 7.5 Hz is usual"));
     }
     let feedback = &options.feedback;
-    let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value <= GAIN);
+    let positive = |value: Option<f64>| value.is_none_or(|value| (SOFTEST..=GAIN).contains(&value));
     if !positive(feedback.stiffness) {
-        return wrong("--stiffness", "a number between 0 and 1e4 is expected");
+        return wrong("--stiffness", "a number from 0.1 to 1e4 is expected");
     }
     if !positive(feedback.orientation_stiffness) {
-        return wrong("--orientation-stiffness", "a number between 0 and 1e4 is expected");
+        return wrong("--orientation-stiffness", "a number from 0.1 to 1e4 is expected");
     }
     if feedback.sensitivity.is_some_and(|k1| !k1.iter().all(|k1| (0.0..=1e6).contains(k1))) {
         return wrong("--k1", "numbers between 0 and 1e6 are expected: a negative one would run towards what pushes");
