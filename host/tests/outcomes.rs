@@ -150,6 +150,31 @@ fn recordings_say_where_they_come_from_and_no_command_mixes_movements() {
     assert!(foreign.contains("demo.csv does not name its movement"), "{foreign}");
 }
 
+/// Seen: a run whose speed and goal were changed on the way left a recording that says `speed: 1` and no goal, so that
+/// its report told the wrong order; and `compare` said nothing of different goals. The change that makes it fail: the
+/// notes of a run leave the changes out, or `compare` looks at speed and mode only.
+#[test]
+fn a_recording_says_what_was_changed_on_the_way_and_compare_tells_of_different_goals() {
+    let folder = learned(3.0, "");
+    let at = folder.path();
+    let [x, y, z] = lab::primitive_file::PrimitiveFile::read(&at.join("reach.toml")).unwrap().goal.position;
+    tactus(at, &format!("{DEVICE} run reach.toml --record taught.csv")).success();
+    tactus(at, &format!("{DEVICE} run reach.toml --goal={x},{y},{} --record higher.csv", z + 0.01)).success();
+    let changes = format!("--speed-at 1:0.8 --goal-at 0.5:{x},{y},{}", z + 0.01);
+    tactus(at, &format!("{DEVICE} run reach.toml {changes} --record changed.csv")).success();
+    let origin = lab::demonstration::Recording::read(&at.join("changed.csv")).unwrap().origin;
+    let said = origin.changes.expect("changes");
+    assert!(said.starts_with("goal_m ") && said.ends_with(" at 0.5 s; speed 0.8 at 1 s"), "{said}");
+    tactus(at, "report changed.csv -o changed.html").success();
+    let page = std::fs::read_to_string(at.join("changed.html")).unwrap();
+    assert!(page.contains("speed 0.8 at 1 s"));
+    for (other, expected) in [("higher.csv", "different goals"), ("changed.csv", "changed on the way")] {
+        let said = stderr(&tactus(at, &format!("compare taught.csv {other}")).success());
+        assert!(said.contains(expected), "{other}: {said}");
+    }
+    assert!(stderr(&tactus(at, "compare taught.csv taught.csv").success()).is_empty());
+}
+
 #[test]
 fn statistics_leave_the_movement_what_it_was() {
     let folder = learned(3.0, "");

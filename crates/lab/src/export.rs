@@ -237,6 +237,7 @@ fn notes(recording: &Recording) -> BTreeMap<String, String> {
         ("speed", origin.speed.map(|speed| speed.to_string())),
         ("mode", origin.mode.clone()),
         ("goal_m", origin.goal.map(|[x, y, z]| format!("{x},{y},{z}"))),
+        ("changes", origin.changes.clone()),
         ("device", origin.device.clone()),
         ("firmware", origin.firmware.clone()),
         ("date", origin.date.clone()),

@@ -36,6 +36,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     for recording in [&one, &other].into_iter().filter(|recording| recording.origin.primitive.is_none()) {
         global.output().warn(format!("{} does not name its movement", recording.file.display()));
     }
+    if one.origin.goal != other.origin.goal {
+        global.output().warn("the runs were made to different goals");
+    }
+    if one.origin.changes != other.origin.changes {
+        global
+            .output()
+            .warn("speed or goal were changed on the way in one of the runs, or otherwise than in the other");
+    }
     if one.origin.speed != other.origin.speed || one.origin.mode != other.origin.mode {
         global.output().warn("the runs were made at different speeds or in different modes");
     }

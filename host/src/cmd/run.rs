@@ -428,9 +428,22 @@ fn notes(client: &Client<Device>, file: &PrimitiveFile, command: &Cmd) -> String
         speed: Some(command.speed),
         mode: Some(command.mode.name().to_owned()),
         goal: command.goal,
+        changes: changes_in_words(command),
         ..files::origin(client, Some(file))
     };
     format!("Tactus recording of a run of '{}', {} Hz\n{origin}", file.name, control::RATE_HZ)
+}
+
+/// The changes on the way in words, in their order; none if there are none.
+fn changes_in_words(command: &Cmd) -> Option<String> {
+    let mut changes: Vec<&Change> = command.goal_at.iter().chain(&command.speed_at).collect();
+    changes.sort_by(|one, other| one.time.total_cmp(&other.time));
+    let words = changes.into_iter().filter_map(|Change { time, kind }| match kind {
+        ChangeKind::Speed(speed) => Some(format!("speed {speed} at {time} s")),
+        ChangeKind::Goal(goal) => goal.position.map(|[x, y, z]| format!("goal_m {x},{y},{z} at {time} s")),
+    });
+    let words: Vec<String> = words.collect();
+    (!words.is_empty()).then(|| words.join("; "))
 }
 
 /// A time and a goal, as in `3.5:0.7,0.1,0.2`.

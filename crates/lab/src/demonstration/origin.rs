@@ -23,6 +23,8 @@ pub struct Origin {
     pub mode: Option<String>,
     /// Goal of the grasp point instead of the taught one, world frame, m.
     pub goal: Option<[f64; 3]>,
+    /// Speeds and goals that were asked for while it runs, in words, `speed 2 at 3 s; goal_m 0.7,0.1,0.2 at 4 s`.
+    pub changes: Option<String>,
     /// Board of the device.
     pub device: Option<String>,
     /// Its firmware.
@@ -45,6 +47,7 @@ impl Origin {
                 "speed" => origin.speed = value.parse().ok(),
                 "mode" => origin.mode = word(),
                 "goal_m" => origin.goal = goal(value),
+                "changes" => origin.changes = word(),
                 "device" => origin.device = word(),
                 "firmware" => origin.firmware = word(),
                 "date" => origin.date = word(),
@@ -78,6 +81,7 @@ impl fmt::Display for Origin {
         line("speed", self.speed.map(|speed| speed.to_string()))?;
         line("mode", self.mode.clone())?;
         line("goal_m", self.goal.map(|[x, y, z]| format!("{x},{y},{z}")))?;
+        line("changes", self.changes.clone())?;
         line("device", self.device.clone())?;
         line("firmware", self.firmware.clone())?;
         line("date", self.date.clone())
@@ -126,6 +130,7 @@ mod tests {
             speed: Some(0.3),
             mode: Some("adapt".to_owned()),
             goal: Some([0.5, -0.25, 0.1]),
+            changes: Some("speed 2 at 3 s; goal_m 0.7,0.1,0.2 at 4.5 s".to_owned()),
             device: Some("in-process".to_owned()),
             firmware: Some("0.1.0 (abc)".to_owned()),
             date: Some(date(0)),
