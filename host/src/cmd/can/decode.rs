@@ -72,7 +72,7 @@ pub struct Sum<'a> {
     pub interfaces: &'a [Summary],
     /// Lines that are not in candump's format.
     pub unreadable_lines: u64,
-    /// How often time goes back by more than a second: the clock was set back, or these are several logs. The times
+    /// Times that time goes back by more than a second: the clock was set back, or these are several logs. The times
     /// behind it count from there on.
     pub times_set_back: u64,
     /// Segments of the host's link that are missing.
@@ -131,7 +131,7 @@ struct Clock {
     latest_us: (u64, u64),
     /// Added to the times of the log, us.
     added_us: u64,
-    /// How often it was set back.
+    /// Times that it was set back.
     set_back: u64,
 }
 
