@@ -135,7 +135,8 @@ impl FromStr for LogLine {
     type Err = LineError;
 
     fn from_str(line: &str) -> Result<Self, LineError> {
-        let rest = line.trim().strip_prefix('(').ok_or(LineError::Form)?;
+        // Some editors put a mark before the first line.
+        let rest = line.trim_start_matches('\u{feff}').trim().strip_prefix('(').ok_or(LineError::Form)?;
         let (time, rest) = rest.split_once(')').ok_or(LineError::Form)?;
         let mut words = rest.split_whitespace();
         let (Some(interface), Some(frame)) = (words.next(), words.next()) else {
@@ -256,6 +257,7 @@ mod tests {
         assert_eq!(read("(1700000000.123456789)  can0  123#01  T").unwrap().time_us, 1_700_000_000_123_456);
         assert_eq!(read("(3.5) can0 123#01 R\r\n").unwrap().time_us, 3_500_000);
         assert_eq!(read("(7) can0 123#01.02").unwrap().frame.data(), [1, 2]);
+        assert_eq!(read("\u{feff}(7) can0 123#01").unwrap().frame.data(), [1]);
     }
 
     #[test]
