@@ -6,7 +6,7 @@ use control::State;
 use link::{HandStage, Refusal};
 
 use super::ProcedureError;
-use super::hand::{HandReach, move_hand};
+use super::hand::{HandReach, move_hand, move_hand_to_the_end};
 use super::wait::{EndCondition, pass, wait_for};
 use crate::client::Client;
 use crate::device::Device;
@@ -107,7 +107,13 @@ pub fn go_to_start(
     let status = client.status()?;
     if status.hand_stage == HandStage::Ready && far(&status.hand, &start.hand, HAND_TOLERANCE) {
         let hand = start.hand.map(|angle| angle as f32);
-        if let HandReach::Stopped(at) = move_hand(client, hand)?
+        // An arm plays while its hand comes to the end of its plan; a hand alone takes no run before.
+        let moved = if client.hello().capabilities.arm {
+            move_hand(client, hand)?
+        } else {
+            move_hand_to_the_end(client, hand)?
+        };
+        if let HandReach::Stopped(at) = moved
             && far(&at, &start.hand, HAND_TOLERANCE)
         {
             return Err(ProcedureError::Hand("something keeps it from going to where the movement begins"));
