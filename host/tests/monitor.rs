@@ -128,6 +128,25 @@ fn the_screen_shows_no_number_that_nobody_has_measured() {
     assert!(shown.contains("J7  +0.000 rad") && shown.contains("no force sensor answers"), "{shown}");
 }
 
+/// Seen: after an emergency stop no cycle comes until the arm has started anew, minutes perhaps. The screen went on
+/// with the last one: its state, its fault, its joint angles, and no word of what the start-up waits for.
+///
+/// The change that makes it fail: the newest cycle counts more than any answer, however old it is.
+#[test]
+fn an_arm_that_starts_anew_is_not_shown_as_its_last_cycle_was() {
+    let mut watch = fault();
+    watch.answer(Status { startup_stage: Stage::WaitingForIdle.code(), ..Status::default() });
+    let shown = screen(&watch, 80, 24);
+    assert!(shown.contains("state IDLE") && !shown.contains("SOFT STOP"), "{shown}");
+    assert!(shown.contains("start-up: ") && shown.contains("Shift-Idle"), "{shown}");
+    assert!(shown.contains("J7  not zeroed") && !shown.contains("rad/s"), "{shown}");
+    // With the first cycle of its new start it is shown as that says.
+    watch.answer(Status { startup_stage: Stage::WaitingForActive.code(), zeroed: true, ..Status::default() });
+    watch.cycle(Telemetry { cycle: 45_200, flags: flags::POSITIONS_KNOWN, q: [0.5; 7], ..Telemetry::default() });
+    watch.answer(Status { startup_stage: Stage::Ready.code(), zeroed: true, ..Status::default() });
+    assert!(screen(&watch, 80, 24).contains("J7  +0.500 rad"), "{}", screen(&watch, 80, 24));
+}
+
 #[test]
 fn a_screen_that_is_too_small_says_so() {
     assert!(screen(&watch(), 79, 24).starts_with("80 x 24 are needed, here are 79 x 24"));

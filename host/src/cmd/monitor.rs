@@ -25,6 +25,10 @@ const ASK_EVERY: Duration = Duration::from_millis(500);
 /// Time between two looks at the keyboard.
 const LOOK_EVERY: Duration = Duration::from_millis(60);
 
+/// Words where the device does not know this program any more because it was started anew.
+const RESTARTED: &str =
+    "the device was started anew, and the monitor looks on anew: what happened meanwhile is not shown";
+
 /// Words where the device let go of this program.
 const ANEW: &str = "the monitor was suspended, and looks on anew: what happened meanwhile is not shown";
 
@@ -89,7 +93,8 @@ enum View {
     Lines(Output),
 }
 
-/// Follows, and looks on anew wherever the device has let go of this program, which was suspended.
+/// Follows, and looks on anew wherever the device does not know this program any more: it was started anew, or has let
+/// go of a program that was suspended.
 fn follow_on(
     client: &mut Client<Device>,
     watch: &mut Watch,
@@ -103,9 +108,10 @@ fn follow_on(
             ended => return ended,
         }
         let owner = connection::owner(client.is_virtual());
-        client.observe_anew(&owner)?;
+        let restarted = client.observe_anew(&owner)?;
+        watch.hello = client.hello().clone();
         let cycle = client.status()?.cycle;
-        let words = watch.note(cycle, ANEW).to_owned();
+        let words = watch.note(cycle, if restarted { RESTARTED } else { ANEW }).to_owned();
         match view {
             View::Lines(output) => {
                 if !output.line(&Streamed::Event { event: words, cycle }, "").map_err(Ended::View)? {
@@ -132,7 +138,7 @@ fn follow(client: &mut Client<Device>, watch: &mut Watch, view: &mut View, end: 
             return Ok(());
         }
         if asked.is_none_or(|asked| now.saturating_sub(asked) >= ASK_EVERY) {
-            watch.status = client.status()?;
+            watch.answer(client.status()?);
             watch.statistics = client.statistics()?;
             asked = Some(now);
         }

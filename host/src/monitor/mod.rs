@@ -49,6 +49,16 @@ impl Watch {
         self.telemetry = Some(telemetry);
     }
 
+    /// Takes the answer to the question for the state. Before the start-up of an arm has come so far no control cycle
+    /// runs: one of before tells nothing of the arm as it is.
+    pub fn answer(&mut self, status: Status) {
+        let stage = Stage::from_code(status.startup_stage);
+        if self.hello.capabilities.arm && !matches!(stage, Some(Stage::WaitingForActive | Stage::Ready)) {
+            self.telemetry = None;
+        }
+        self.status = status;
+    }
+
     /// Takes an event; in words.
     pub fn event(&mut self, event: &Event) -> &str {
         self.note(event.cycle, &words(event))

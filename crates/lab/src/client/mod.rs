@@ -118,13 +118,19 @@ pub struct Client<T: Transport> {
     took: VecDeque<Duration>,
     /// A motion of the arm that this host has ordered goes on.
     moving: bool,
+    /// A cycle of it has been told: the first one behind it that tells none is its end.
+    seen_moving: bool,
     /// Until then a motion of the hand that this host has ordered may go on.
     hand_moves_until: Duration,
     observing: bool,
+    /// The device's time has gone back: it was started anew.
+    restarted: bool,
     open: bool,
     timeout: Duration,
     transfer: Transfer,
     interrupt: Interrupt,
+    /// That wish has been told: what is asked for from then on is asked for in spite of it.
+    is_heeded: bool,
     received: Vec<u8>,
 }
 
@@ -169,12 +175,15 @@ impl<T: Transport> Client<T> {
             round_trips: RoundTrips::default(),
             took: VecDeque::new(),
             moving: false,
+            seen_moving: false,
             hand_moves_until: Duration::ZERO,
             observing: false,
+            restarted: false,
             open: false,
             timeout: ANSWER_TIMEOUT,
             transfer: Transfer::default(),
             interrupt: Interrupt::never(),
+            is_heeded: false,
             received: Vec::new(),
         };
         // Ends whatever half a frame an earlier host may have left on the line.
@@ -242,7 +251,7 @@ impl<T: Transport> Client<T> {
 
     /// Ends waiting, and stops the arm, when the user interrupts.
     pub fn set_interrupt(&mut self, interrupt: Interrupt) {
-        self.interrupt = interrupt;
+        (self.interrupt, self.is_heeded) = (interrupt, false);
     }
 
     /// Longest wait for an answer.
@@ -297,24 +306,21 @@ impl<T: Transport> Client<T> {
         self.took.drain(..).collect()
     }
 
-    /// Sends a request and waits for its answer.
+    /// Sends a request and waits for its answer. Nothing is begun for a user who has interrupted before.
     ///
     /// # Errors
-    /// [`HostError::Refused`], [`HostError::NoAnswer`] after the time-out, [`HostError::Transport`].
+    /// [`HostError::Refused`], [`HostError::NoAnswer`] after the time-out, [`HostError::Transport`]; of what begins a
+    /// motion, or gives torque, [`HostError::Left`] and [`HostError::Interrupted`].
     pub fn request(&mut self, request: &Request) -> Result<Reply, HostError> {
+        if self.interrupt.is_raised() && !self.is_heeded && motion::begins(request, self.moving) {
+            return Err(self.interrupted());
+        }
         if request.moves() && self.transport.now().saturating_sub(self.heard) > FRESH {
             self.exchange(&Request::Ping)?;
         }
         // What moves is refused at once: it would begin when nobody expects it any more.
         let reply = if request.moves() { self.exchange(request) } else { self.exchange_when_read(request) }?;
-        match request {
-            Request::Gravity | Request::Approach { .. } | Request::Run { .. } => self.moving = true,
-            Request::MoveHand { duration, .. } => self.hand_may_move_for(*duration),
-            Request::InitialiseHand => self.hand_may_move_for(0.0),
-            Request::Stop => (self.moving, self.hand_moves_until) = (false, Duration::ZERO),
-            Request::Hold | Request::Release => self.moving = false,
-            _ => {}
-        }
+        self.note_order(request);
         Ok(reply)
     }
 
@@ -441,10 +447,11 @@ impl<T: Transport> Client<T> {
 
     fn sort(&mut self, frame: frame::Frame<Reply>) {
         (self.heard, self.listened_before) = (self.transport.now(), self.listened);
-        self.device_ms = frame.envelope.time_ms;
+        self.note_time(frame.envelope.time_ms);
         match frame.message {
             Reply::Telemetry(telemetry) => {
                 self.gaps.telemetry(telemetry.cycle);
+                self.note_state(telemetry.state);
                 self.incoming.push_back(Incoming::Telemetry(telemetry));
             }
             Reply::Event(event) => {
@@ -512,7 +519,10 @@ impl<T: Transport> Client<T> {
     /// As [`Client::request`].
     pub fn status(&mut self) -> Result<Status, HostError> {
         match self.request(&Request::Status)? {
-            Reply::Status { status, .. } => Ok(status),
+            Reply::Status { status, .. } => {
+                self.moving &= motion::is_moving(status.state);
+                Ok(status)
+            }
             _ => Err(HostError::WrongAnswer { request: "status" }),
         }
     }

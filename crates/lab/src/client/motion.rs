@@ -151,6 +151,31 @@ impl<T: Transport> Client<T> {
         Ok(())
     }
 
+    /// Notes what a request that was taken sets in motion, or ends.
+    pub(super) fn note_order(&mut self, request: &Request) {
+        match request {
+            Request::Gravity | Request::Approach { .. } | Request::Run { .. } => {
+                (self.moving, self.seen_moving) = (true, false);
+            }
+            Request::MoveHand { duration, .. } => self.hand_may_move_for(*duration),
+            Request::InitialiseHand => self.hand_may_move_for(0.0),
+            Request::Stop => (self.moving, self.hand_moves_until) = (false, Duration::ZERO),
+            Request::Hold | Request::Release => self.moving = false,
+            _ => {}
+        }
+    }
+
+    /// Notes the state in a cycle of the device. The event that ends a motion may have been lost on the line; a motion
+    /// that has ended is not stopped. Cycles of before the motion may come behind the answer to its order.
+    pub(super) fn note_state(&mut self, state: u8) {
+        match State::from_code(state) {
+            Some(State::Gravity | State::Approach | State::Run) => self.seen_moving = true,
+            // What is bridged may be a hold as well as a motion.
+            Some(State::Coast) => {}
+            _ => self.moving &= !self.seen_moving,
+        }
+    }
+
     /// A motion of the hand begins that takes so long, s; 0 is as long as the device chooses, or an initialisation
     /// takes.
     pub(super) fn hand_may_move_for(&mut self, seconds: f32) {
@@ -163,6 +188,7 @@ impl<T: Transport> Client<T> {
     /// Nothing is stopped where this host has set nothing in motion: what moves is another's, and `tactus stop` is
     /// there for it.
     pub(super) fn interrupted(&mut self) -> HostError {
+        self.is_heeded = true;
         if !self.moving && self.now() >= self.hand_moves_until {
             return HostError::Left;
         }
@@ -185,6 +211,20 @@ const LOOK: Duration = Duration::from_millis(20);
 
 /// Longest time for which an arm that is stopping is waited for.
 const REST_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// True for what sets arm or hand in motion, or gives an arm torque that had none: a hold of one that is `moving` for
+/// this host is how its motion ends.
+pub(super) fn begins(request: &Request, moving: bool) -> bool {
+    match request {
+        Request::Gravity
+        | Request::Approach { .. }
+        | Request::Run { .. }
+        | Request::InitialiseHand
+        | Request::MoveHand { .. } => true,
+        Request::Hold => !moving,
+        _ => false,
+    }
+}
 
 /// True for a state that the device would end when this host fell silent.
 pub(super) fn is_moving(state: u8) -> bool {

@@ -26,17 +26,25 @@ impl<T: Transport> Client<T> {
         Ok(client)
     }
 
-    /// Looks on anew, on the same line, once the device has let go of this host: it does so of one that was suspended.
-    /// A stream of telemetry has to be asked for again.
+    /// Looks on anew, on the same line, once the device does not know this host any more: true if the device was
+    /// started anew, false if it has let go of a host that was suspended. A stream of telemetry has to be asked for
+    /// again.
     ///
     /// # Errors
     /// As [`Client::observe`].
-    pub fn observe_anew(&mut self, owner: &str) -> Result<(), HostError> {
+    pub fn observe_anew(&mut self, owner: &str) -> Result<bool, HostError> {
+        let restarted = self.restarted;
         (self.open, self.session, self.sequence, self.device_ms) =
             (false, session_number(self.transport.is_virtual()), 0, 0);
         // Answers to what was asked before have numbers that are given anew.
         self.answers.clear();
-        self.look_on(owner)
+        self.look_on(owner).map(|()| restarted)
+    }
+
+    /// Takes the device's time (ms) of a message; it wraps after 49 days.
+    pub(super) fn note_time(&mut self, time_ms: u32) {
+        self.restarted |= time_ms.wrapping_sub(self.device_ms) > u32::MAX / 2;
+        self.device_ms = time_ms;
     }
 
     fn look_on(&mut self, owner: &str) -> Result<(), HostError> {
@@ -54,16 +62,22 @@ impl<T: Transport> Client<T> {
             // On a machine that is busy a simulated device's time passes more slowly than this clock.
             greeted = self.greet(&greeting, &hello, 2 * Duration::from_millis(wait.into()));
         }
+        if matches!(greeted, Err(HostError::NoAnswer { .. })) {
+            // A device of an older version does not know the request; it knows a hello, and says what it is.
+            self.open(owner, LINK_VERSION, SCHEMA_HASH, BUSY_TIMEOUT)?;
+            // One of this version was silent until now. It is left to whoever wants to command it.
+            self.open = false;
+            let _ = self.exchange(&Request::Goodbye);
+            greeted = self.greet(&greeting, &hello, BUSY_TIMEOUT);
+        }
         match greeted {
             Ok(device) => self.hello = device,
             Err(HostError::Refused { reason: Refusal::Busy, detail: [_, wait_ms], .. }) => {
                 return Err(HostError::Watched { wait_ms });
             }
-            // A device of an older version does not know the request; it knows a hello, and says what it is.
-            Err(HostError::NoAnswer { .. }) => return self.open(owner, LINK_VERSION, SCHEMA_HASH, BUSY_TIMEOUT),
             Err(error) => return Err(error),
         }
-        (self.open, self.observing) = (true, true);
+        (self.open, self.observing, self.restarted) = (true, true, false);
         Ok(())
     }
 

@@ -96,6 +96,8 @@ pub(crate) struct Device {
     pub(crate) session: Box<Session<RamStore<3, 4096>>>,
     pub(crate) half: Half,
     pub(crate) steps: u32,
+    /// Of these, those that had passed when it was started the last time.
+    pub(crate) booted: u32,
     /// Every so many portions from the host are lost; 0: none.
     pub(crate) lose_every: u32,
     /// Every so many portions to the host are lost; 0: none.
@@ -139,6 +141,7 @@ impl Device {
                 line: Vec::new(),
             },
             steps: 0,
+            booted: 0,
             lose_every: 0,
             lose_answers_every: 0,
             portions: 0,
@@ -168,8 +171,13 @@ impl Device {
             }
         }
         if !self.dead {
-            self.session.poll((STEP * self.steps).as_micros() as u64, &mut self.half);
+            self.session.poll((STEP * (self.steps - self.booted)).as_micros() as u64, &mut self.half);
         }
+    }
+
+    /// A reset: it knows nobody any more, and its time begins anew.
+    pub(crate) fn restart(&mut self) {
+        *self = Self { steps: self.steps, booted: self.steps, ..Self::new() };
     }
 }
 

@@ -4,6 +4,7 @@ mod fixture;
 mod secret;
 #[cfg(unix)]
 mod serial;
+mod unusual;
 
 use std::cell::RefCell;
 use std::io::Write as _;
