@@ -126,6 +126,34 @@ fn ctrl_c_does_not_reach_the_emulator_of_a_simulated_arm() {
     assert_ne!(emulator, tool, "they get the same signals");
 }
 
+/// Seen: an Enter that was pressed while the arm started ended the demonstration at its first sample, and the command
+/// with success: with `--force` the demonstration of before was gone.
+///
+/// The change that makes it fail: whatever is typed before the movement is shown is kept until then.
+#[test]
+fn an_enter_of_before_the_demonstration_does_not_end_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = format!(
+        "stty rows 24 cols 120; echo begun; exec {} --device sil:world=simple teach --at-home -o demo.csv",
+        env!("CARGO_BIN_EXE_tactus")
+    );
+    let mut terminal = Command::new("timeout");
+    terminal.args(["--foreground", &TIMEOUT.as_secs().to_string(), "script", "-qfc", &line, "/dev/null"]);
+    terminal.current_dir(folder.path()).env("XDG_CONFIG_HOME", folder.path()).env("SHELL", "/bin/sh");
+    let terminal = terminal.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+    let mut terminal = terminal.expect("`script` has to be installed: package bsdutils");
+    let (mut typed, mut shown) = (terminal.stdin.take().unwrap(), terminal.stdout.take().unwrap());
+    until(&mut shown, "begun");
+    typed.write_all(b"\n").unwrap();
+    until(&mut shown, "press Enter");
+    std::thread::sleep(Duration::from_millis(500));
+    typed.write_all(b"\n").unwrap();
+    until(&mut shown, "samples");
+    terminal.wait().unwrap();
+    let samples = std::fs::read_to_string(folder.path().join("demo.csv")).unwrap().lines().count();
+    assert!(samples > 60, "{samples} lines");
+}
+
 #[test]
 fn a_monitor_ends_with_its_terminal() {
     for terminal in 0..TERMINALS {

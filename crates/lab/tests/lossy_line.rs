@@ -29,10 +29,14 @@ struct Line {
     replies: Decoder<FRAME_BYTES>,
     /// No `Arrived` comes through.
     loses_arrivals: bool,
+    /// No cycle comes through whose number can be divided by five.
+    loses_cycles: bool,
     /// Somebody else stops the arm once its hand is seen to be initialised.
     stops_hand: bool,
     /// Zeroings that the host asked for.
     zeroings: Arc<AtomicU32>,
+    /// Stops that it asked for.
+    stops: Arc<AtomicU32>,
 }
 
 impl Line {
@@ -44,8 +48,10 @@ impl Line {
             requests: Decoder::new(),
             replies: Decoder::new(),
             loses_arrivals: false,
+            loses_cycles: false,
             stops_hand: false,
             zeroings: Arc::default(),
+            stops: Arc::default(),
         }
     }
 
@@ -57,6 +63,7 @@ impl Line {
     fn passed(&mut self, envelope: Envelope, mut message: Reply) -> Option<Reply> {
         match &mut message {
             Reply::Event(Event { kind: EventKind::Arrived, .. }) if self.loses_arrivals => return None,
+            Reply::Telemetry(cycle) if self.loses_cycles && cycle.cycle.is_multiple_of(5) => return None,
             Reply::Hello { hello, .. } => hello.simulated = false,
             Reply::Status { status, .. } if self.stops_hand && status.hand_stage == HandStage::Initialising => {
                 self.stops_hand = false;
@@ -80,6 +87,7 @@ impl Transport for Line {
         let mut rest = bytes;
         while let Some(frame) = self.requests.next::<Request>(&mut rest) {
             self.zeroings.fetch_add(u32::from(matches!(frame.message, Request::Zero { .. })), Ordering::Relaxed);
+            self.stops.fetch_add(u32::from(frame.message == Request::Stop), Ordering::Relaxed);
         }
         self.simulation.send(bytes)
     }
@@ -118,6 +126,28 @@ fn a_motion_whose_arrival_is_lost_on_the_line_ends_all_the_same() {
     assert!(!passed[0].up.is_empty() && !passed[0].down.is_empty());
 }
 
+/// Seen: the one event that tells of the end of a motion was lost. The command ended well, and its farewell stopped the
+/// arm that was to hold its place.
+///
+/// The change that makes it fail: to the client a motion goes on until an event tells of its end, whatever the status
+/// (first) or the cycles (second) say.
+#[test]
+fn an_arm_whose_arrival_is_lost_on_the_line_is_not_stopped_when_its_program_ends() {
+    let posture = common::START.map(|angle| angle as f32);
+    for by_cycles in [false, true] {
+        let stops = Arc::new(AtomicU32::new(0));
+        let mut client = Line { loses_arrivals: true, stops: stops.clone(), ..Line::new(|_| {}) }.connected();
+        procedure::start_up(&mut client, true, Stage::Ready, |_| {}).unwrap();
+        if by_cycles {
+            procedure::slide_postures(&mut client, &[posture], &[3.0], |_| {}).map(drop).unwrap();
+        } else {
+            procedure::travel(&mut client, posture, |_| {}).unwrap();
+        }
+        drop(client);
+        assert_eq!(stops.load(Ordering::Relaxed), 0, "by cycles: {by_cycles}");
+    }
+}
+
 /// The change that makes it fail: a run has arrived only where that is told.
 #[test]
 fn a_run_whose_arrival_is_lost_on_the_line_ends_all_the_same() {
@@ -133,6 +163,24 @@ fn a_run_whose_arrival_is_lost_on_the_line_ends_all_the_same() {
     let taught = learned.movement.duration;
     assert!((taught..taught + 2.0).contains(&outcome.arrived_s), "{} s of {taught} s", outcome.arrived_s);
     assert_eq!(control::State::from_code(last), Some(control::State::Hold));
+}
+
+/// Seen: where a fifth of the cycles was lost on the line, a demonstration of 2 s was recorded for 2.5 s, and `teach`
+/// said that it was 2 s long.
+///
+/// The change that makes it fail: the time of a recording is the number of its samples.
+#[test]
+fn a_demonstration_is_as_long_as_was_asked_for_where_cycles_are_lost_on_the_line() {
+    let mut client = Line { loses_cycles: true, ..Line::new(|_| {}) }.connected();
+    procedure::start_up(&mut client, true, Stage::Ready, |_| {}).unwrap();
+    client.gravity().unwrap();
+    let recorder = procedure::Recorder::start(&mut client, Vec::new(), "").unwrap();
+    let begun = client.now();
+    let shown = procedure::record_demonstration(&mut client, recorder, 2.0, 0.0, |_, _| false).unwrap();
+    let took = (client.now() - begun).as_secs_f64();
+    assert!((1.95..2.1).contains(&took) && (1.95..2.1).contains(&shown.seconds), "{took} s, {} s", shown.seconds);
+    assert!((450..500).contains(&shown.samples), "{}", shown.samples);
+    client.hold().unwrap();
 }
 
 /// The change that makes it fail: a hand that is not initialised any more is waited for.

@@ -1,9 +1,11 @@
 //! `tactus teach`: the arm becomes weightless, a person shows a movement, and it is recorded.
 
+use std::io::IsTerminal as _;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
+use rustix::termios::{QueueSelector, tcflush};
 use schemars::JsonSchema;
 use serde::Serialize;
 use sim::teacher::TaughtMovement;
@@ -14,7 +16,7 @@ use lab::client::Client;
 use lab::demonstration::{FEWEST_SAMPLES, RATE};
 use lab::device::Device;
 use lab::error::Capability;
-use lab::procedure::{self, ProcedureError, Recorder, teacher};
+use lab::procedure::{self, Demonstrated, ProcedureError, Recorder, teacher};
 use lab::simulation::{DEFAULT_SEED, SimulationOptions};
 
 /// Rest that is recorded after the simulated teacher has let go, s.
@@ -131,14 +133,14 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let held = client.hold();
     let recorded = recorded.and_then(|recorded| Ok(held.map(|()| recorded)?));
     connection::tell_speed(&client, started, output);
-    let recorded = recorded.map_err(failed).and_then(|(rows, gaps, is_shown)| match is_shown {
-        true => Ok((rows, gaps)),
+    let recorded = recorded.map_err(failed).and_then(|(shown, gaps, is_shown)| match is_shown {
+        true => Ok((shown.samples, shown.seconds, gaps)),
         false => Err(nobody("any more: standard input has ended")),
     });
-    let (rows, gaps) = file.end(recorded, output)?;
+    let (samples, duration_s, gaps) = file.end(recorded, output)?;
     output.result(
-        &Taught { file: files::text(&command.output), samples: rows, duration_s: rows as f64 / RATE, gaps },
-        format!("{rows} samples, {:.1} s, {gaps} lost", rows as f64 / RATE),
+        &Taught { file: files::text(&command.output), samples, duration_s, gaps },
+        format!("{samples} samples, {duration_s:.1} s, {gaps} lost"),
     )
 }
 
@@ -169,14 +171,14 @@ pub struct Taught {
     pub gaps: u32,
 }
 
-/// Records until the person is done; gives the number of samples, of those lost on the link, and whether anybody said
-/// that the movement is shown.
-fn record(
+/// Records until the person is done; gives the recording, the number of samples that were lost on the link, and whether
+/// anybody said that the movement is shown.
+fn record<'file>(
     command: &Cmd,
     global: &Global,
     client: &mut Client<Device>,
-    recorder: Recorder<&mut Counted>,
-) -> Result<(usize, u32, bool), ProcedureError> {
+    recorder: Recorder<&'file mut Counted>,
+) -> Result<(Demonstrated<&'file mut Counted>, u32, bool), ProcedureError> {
     let output = global.output();
     let guided = teacher::begin(client);
     let enter = (!guided && command.duration.is_none()).then(wait_for_enter);
@@ -194,7 +196,7 @@ fn record(
         (guided && teacher::has_finished(client)) || enter.as_ref().is_some_and(|enter| enter.is_finished())
     });
     spinner.finish_and_clear();
-    let samples = shown?.samples;
+    let shown = shown?;
     if enter.as_ref().is_some_and(|enter| !enter.is_finished()) {
         output.warn(format!(
             "nobody pressed Enter within {limit:.0} s: the recording has ended by itself, perhaps in the middle of the \
@@ -202,11 +204,17 @@ fn record(
         ));
     }
     let ended_unsaid = enter.filter(|enter| enter.is_finished()).is_some_and(|enter| !enter.join().unwrap_or(false));
-    Ok((samples, client.gaps().telemetry, !ended_unsaid))
+    Ok((shown, client.gaps().telemetry, !ended_unsaid))
 }
 
-/// A thread that ends when Enter is pressed; false if standard input has ended, and nobody can press it any more.
+/// A thread that ends when Enter is pressed from now on; false if standard input has ended, and nobody can press it any
+/// more.
 fn wait_for_enter() -> std::thread::JoinHandle<bool> {
+    let stdin = std::io::stdin();
+    if stdin.is_terminal() {
+        // An Enter of before, while the arm started or went to where the movement begins, shows no end of it.
+        let _ = tcflush(&stdin, QueueSelector::IFlush);
+    }
     std::thread::spawn(|| std::io::stdin().read_line(&mut String::new()).is_ok_and(|bytes| bytes > 0))
 }
 

@@ -67,7 +67,8 @@ pub fn recording_text(cycles: &[Telemetry], notes: &str) -> std::io::Result<Vec<
 #[derive(Debug)]
 pub struct CycleWriter<W: Write> {
     writer: RecordingWriter<W>,
-    first: Option<u32>,
+    /// The first cycle, and the newest.
+    span: Option<(u32, u32)>,
 }
 
 impl<W: Write> CycleWriter<W> {
@@ -76,7 +77,7 @@ impl<W: Write> CycleWriter<W> {
     /// # Errors
     /// The output's error.
     pub fn new(output: W, notes: &str) -> std::io::Result<Self> {
-        Ok(Self { writer: RecordingWriter::new(output, notes)?, first: None })
+        Ok(Self { writer: RecordingWriter::new(output, notes)?, span: None })
     }
 
     /// Writes one cycle.
@@ -84,13 +85,20 @@ impl<W: Write> CycleWriter<W> {
     /// # Errors
     /// The output's error.
     pub fn write(&mut self, telemetry: &Telemetry) -> std::io::Result<()> {
-        let first = *self.first.get_or_insert(telemetry.cycle);
+        let first = self.span.map_or(telemetry.cycle, |(first, _)| first);
+        self.span = Some((first, telemetry.cycle));
         self.writer.write(&recording_row(telemetry, first))
     }
 
     /// Cycles written so far.
     pub fn rows(&self) -> usize {
         self.writer.rows()
+    }
+
+    /// Time from the beginning of the first cycle to the end of the newest, s. Cycles that were lost on the way took
+    /// theirs all the same.
+    pub fn seconds(&self) -> f64 {
+        self.span.map_or(0.0, |(first, newest)| (f64::from(newest.wrapping_sub(first)) + 1.0) / RATE)
     }
 
     /// Hands every byte to the output and gives it back.
@@ -146,6 +154,11 @@ impl<W: Write> Recorder<W> {
     /// Cycles written so far.
     pub fn rows(&self) -> usize {
         self.writer.rows()
+    }
+
+    /// As [`CycleWriter::seconds`].
+    pub fn seconds(&self) -> f64 {
+        self.writer.seconds()
     }
 
     /// Switches the stream off and closes the file.

@@ -7,7 +7,6 @@ use control::{Fault, State};
 use super::ProcedureError;
 use super::recorder::{Recorder, Take};
 use crate::client::Client;
-use crate::demonstration::RATE;
 use crate::device::Device;
 
 /// A demonstration that was recorded.
@@ -17,6 +16,8 @@ pub struct Demonstrated<W> {
     pub output: W,
     /// Samples in it.
     pub samples: usize,
+    /// Time that it covers, s, with the samples that were lost on the line.
+    pub seconds: f64,
     /// True if the movement came to its end, false if the time was over before.
     pub is_complete: bool,
 }
@@ -40,7 +41,7 @@ pub fn record_demonstration<W: Write>(
         if !matches!(State::from_code(telemetry.state), Some(State::Gravity | State::Coast)) {
             return Err(ProcedureError::Stopped(Fault::from_code(telemetry.fault).unwrap_or(Fault::None)));
         }
-        let seconds = recorder.rows() as f64 / RATE;
+        let seconds = recorder.seconds();
         if is_shown(client, seconds) && end.is_none() {
             end = Some(seconds + post_roll);
         }
@@ -48,8 +49,8 @@ pub fn record_demonstration<W: Write>(
             break;
         }
     }
-    let samples = recorder.rows();
-    Ok(Demonstrated { output: recorder.finish(client)?, samples, is_complete: end.is_some() })
+    let (samples, seconds) = (recorder.rows(), recorder.seconds());
+    Ok(Demonstrated { output: recorder.finish(client)?, samples, seconds, is_complete: end.is_some() })
 }
 
 /// The simulated teacher beside an arm in the MuJoCo world.
