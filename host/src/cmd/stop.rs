@@ -46,6 +46,9 @@ fn report(mut client: Client<Device>, command: &Cmd, global: &Global) -> Result<
     let fault = status.fault;
     if cleared {
         client.clear_fault().map_err(|error| connection::refused(&mut client, error, DOING))?;
+        // A soft stop that is cleared floats. The device would stop that as soon as this host leaves, and count it as
+        // one that fell silent.
+        client.stop().map_err(|error| connection::refused(&mut client, error, DOING))?;
         status = client.status().map_err(|error| error.into_failure(DOING))?;
     }
     let state = State::from_code(status.state).map_or("unknown", State::name);
