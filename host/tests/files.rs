@@ -143,7 +143,9 @@ fn h14_what_was_recorded_before_a_signal_is_kept_and_named() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         std::fs::write(at.join("long.csv"), "precious").unwrap();
-        let child = start(at, &format!("{DEVICE} record --duration 3600 -o long.csv --force"));
+        // What `nohup` starts ignores a closed terminal, and so does the command of a test that it has started.
+        let mut child = tool::heeding(signal, at, &format!("{DEVICE} record --duration 3600 -o long.csv --force"));
+        let child = child.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         grown(&at.join("long.csv.part"), 1_000_000);
         // Twice: as a terminal and a wrapper deliver it.
         for _ in 0..2 {

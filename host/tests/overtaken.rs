@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::tool::{heeding, learned, said, succeeds};
+use crate::tool::{heeding, ignoring, learned, said, succeeds};
 
 const DEVICE: &str = "--device sil:world=simple --non-interactive";
 
@@ -45,6 +45,21 @@ fn what_an_interrupted_rehearsal_has_measured_is_kept() {
     assert!(std::fs::read_to_string(&part).unwrap().lines().count() > 20, "its samples");
     let left: Vec<_> = at.join("kept").read_dir().unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(left.len(), 1, "of the trials that never began nothing is left: {left:?}");
+}
+
+/// Seen: `nohup tactus run ... &`, and the terminal was closed: the run was stopped in the middle, with 130.
+///
+/// The change that makes it fail: a signal that was to be ignored is heeded all the same.
+#[test]
+fn a_run_that_was_started_with_nohup_outlives_its_terminal() {
+    let folder = learned(20.0);
+    let at = folder.path();
+    let mut run = ignoring("HUP", at, &format!("{DEVICE} run reach.toml --record run.csv"));
+    let mut run = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    grows(&mut run, &at.join("run.csv.part"), 50_000);
+    assert!(Command::new("kill").args(["-s", "HUP", &run.id().to_string()]).status().unwrap().success());
+    let ended = run.wait_with_output().unwrap();
+    assert!(ended.status.success() && at.join("run.csv").is_file(), "{}", said(&ended));
 }
 
 /// The change that makes it fail: the primitive is always put back.

@@ -446,12 +446,12 @@ pub(super) fn owner(simulated: bool) -> String {
     format!("{user}{at}{host} (process {})", std::process::id())
 }
 
-/// Raised by the first signal that asks a program to end ([`interruption::ENDING`]). A second one ends the process at
-/// once, unless it is the same one, delivered twice: by the terminal and by the program that started this one.
+/// Raised by the first signal that asks a program to end ([`interruption::of_an_arm`]). A second one ends the process
+/// at once, unless it is the same one, delivered twice: by the terminal and by the program that started this one.
 pub(super) fn interrupt() -> Interrupt {
     let interrupt = Interrupt::never();
     let flag = interrupt.flag();
-    match Signals::new(interruption::ENDING) {
+    match Signals::new(interruption::of_an_arm()) {
         Ok(mut signals) => {
             interruption::leave_to_another();
             std::thread::spawn(move || {

@@ -30,6 +30,12 @@ pub(super) fn clear_away() {
     });
 }
 
+/// The signals that stop the arm of this command: all of them, but for a terminal that is closed where whoever started
+/// it wants it to outlive that.
+pub(super) fn of_an_arm() -> impl Iterator<Item = i32> {
+    ENDING.into_iter().filter(|signal| *signal != SIGHUP || !is_ignored(*signal))
+}
+
 /// Leaves all signals from now on to whoever has just asked for them.
 pub(super) fn leave_to_another() {
     IS_ANOTHERS.store(true, Ordering::SeqCst);

@@ -59,6 +59,13 @@ pub(crate) fn heeding(signal: &str, folder: &Path, line: &(impl Words + ?Sized))
     prepared(command, folder, line)
 }
 
+/// The same, ignoring a signal, as what `nohup` starts ignores that of a terminal that is closed.
+pub(crate) fn ignoring(signal: &str, folder: &Path, line: &(impl Words + ?Sized)) -> Command {
+    let mut command = Command::new("env");
+    command.arg(format!("--ignore-signal={signal}")).arg(env!("CARGO_BIN_EXE_tactus"));
+    prepared(command, folder, line)
+}
+
 fn prepared(mut command: Command, folder: &Path, line: &(impl Words + ?Sized)) -> Command {
     command.current_dir(folder).env("XDG_CONFIG_HOME", folder);
     for name in ["TACTUS_DEVICE", "TACTUS_TIMEOUT", "TACTUS_SECRET_FILE"] {
