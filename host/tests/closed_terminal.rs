@@ -6,7 +6,7 @@
 use std::fs::File;
 use std::io::{Read as _, Write as _, read_to_string};
 use std::path::Path;
-use std::process::{ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 
@@ -43,6 +43,17 @@ fn ends_with_its_terminal(folder: &Path) -> bool {
     has_ended
 }
 
+/// Runs this line of a shell in a terminal of its own, for `TIMEOUT` at most; with what is typed and shown there.
+fn in_a_terminal(folder: &Path, line: &str) -> (Child, ChildStdin, ChildStdout) {
+    let mut terminal = Command::new("timeout");
+    terminal.args(["--foreground", &TIMEOUT.as_secs().to_string(), "script", "-qfc", line, "/dev/null"]);
+    terminal.current_dir(folder).env("XDG_CONFIG_HOME", folder).env("SHELL", "/bin/sh");
+    let terminal = terminal.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+    let mut terminal = terminal.expect("`script` has to be installed: package bsdutils");
+    let (typed, shown) = (terminal.stdin.take().unwrap(), terminal.stdout.take().unwrap());
+    (terminal, typed, shown)
+}
+
 /// Reads what a terminal shows until these words have come.
 fn until(shown: &mut ChildStdout, words: &str) {
     let (mut seen, mut bytes) = (Vec::new(), [0; 4096]);
@@ -77,12 +88,7 @@ fn a_monitor_that_is_suspended_gives_the_terminal_to_the_shell_and_draws_all_of_
          echo shell $((6 * 7)); read line; fg; echo shell $((8 * 8)); read line; fg; echo shell $((9 * 9))",
         env!("CARGO_BIN_EXE_tactus")
     );
-    let mut terminal = Command::new("timeout");
-    terminal.args(["--foreground", &TIMEOUT.as_secs().to_string(), "script", "-qfc", &line, "/dev/null"]);
-    terminal.current_dir(folder.path()).env("XDG_CONFIG_HOME", folder.path()).env("SHELL", "/bin/sh");
-    let terminal = terminal.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
-    let mut terminal = terminal.expect("`script` has to be installed: package bsdutils");
-    let (mut typed, mut shown) = (terminal.stdin.take().unwrap(), terminal.stdout.take().unwrap());
+    let (mut terminal, mut typed, mut shown) = in_a_terminal(folder.path(), &line);
     until(&mut shown, "joints");
     let process = std::fs::read_to_string(folder.path().join("pid")).unwrap();
     typed.write_all(b"\x1a").unwrap();
@@ -137,12 +143,7 @@ fn an_enter_of_before_the_demonstration_does_not_end_it() {
         "stty rows 24 cols 120; echo begun; exec {} --device sil:world=simple teach --at-home -o demo.csv",
         env!("CARGO_BIN_EXE_tactus")
     );
-    let mut terminal = Command::new("timeout");
-    terminal.args(["--foreground", &TIMEOUT.as_secs().to_string(), "script", "-qfc", &line, "/dev/null"]);
-    terminal.current_dir(folder.path()).env("XDG_CONFIG_HOME", folder.path()).env("SHELL", "/bin/sh");
-    let terminal = terminal.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
-    let mut terminal = terminal.expect("`script` has to be installed: package bsdutils");
-    let (mut typed, mut shown) = (terminal.stdin.take().unwrap(), terminal.stdout.take().unwrap());
+    let (mut terminal, mut typed, mut shown) = in_a_terminal(folder.path(), &line);
     until(&mut shown, "begun");
     typed.write_all(b"\n").unwrap();
     until(&mut shown, "press Enter");
