@@ -3,9 +3,10 @@
 //!
 //! Wraps the crate's processor. Every access to bank 2 is routed to the bus, where this answers it: through the cache
 //! while the protection unit or the default map makes the address cacheable, past it otherwise. The registers of cache
-//! maintenance are routed the same way.
+//! maintenance are routed the same way, and so are the last words of the image, of which a reset may lose a part.
 
 mod cache_bus;
+mod partial;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -20,6 +21,7 @@ use rigless::time::VirtualNanos;
 use crate::cache::{BANK, CacheCount, DataCache};
 use crate::notes::{FaultNote, Stray};
 use cache_bus::CacheBus;
+use partial::PartialWords;
 
 /// Registers by the numbers of the crate's debugger.
 mod register {
@@ -44,6 +46,9 @@ const MPU_RASR: u64 = 0xE000_EDA0;
 
 /// CCR.DC: the data cache is on.
 const DATA_CACHE: u64 = 1 << 16;
+
+/// Bytes of the last words, mark and check sum included.
+const KEPT_BYTES: u32 = 512;
 
 /// Content of a word under the stack that nothing has touched since service began.
 pub const SERVICE_PAINT: u32 = 0xA5A5_A5A5;
@@ -116,6 +121,10 @@ pub struct CoreState {
     pub loops_lost: u32,
     /// An operation of bank 2 does not end.
     pub bank_hangs: bool,
+    /// Where the image keeps its last words, if it keeps any.
+    pub kept: Option<u32>,
+    /// Parts of words there that a reset would lose.
+    pub partial: PartialWords,
 }
 
 /// [`CoreState`], shared.
@@ -273,7 +282,10 @@ impl Processor for Core {
         if !self.routed {
             self.routed = true;
             let page = self.inner.page_size().max(1);
-            for address in (u64::from(BANK.start)..u64::from(BANK.end)).step_by(page as usize) {
+            let kept = self.shared.lock().kept.map_or(0..0, |start| u64::from(start)..u64::from(start + KEPT_BYTES));
+            let first = kept.start - kept.start % page;
+            let kept = (first..kept.end).step_by(page as usize);
+            for address in (u64::from(BANK.start)..u64::from(BANK.end)).step_by(page as usize).chain(kept) {
                 self.inner.ask(Queued::Route(address));
             }
         }
@@ -292,7 +304,12 @@ impl Processor for Core {
     }
 
     fn reset(&mut self) {
-        self.shared.lock().cache.clear();
+        {
+            let mut state = self.shared.lock();
+            state.cache.clear();
+            let lost: Vec<_> = state.partial.forget().collect();
+            state.orders.extend(lost.into_iter().map(|(address, held)| Order::Poke(address, vec![held])));
+        }
         self.inner.reset();
     }
 

@@ -57,6 +57,7 @@ pub fn run(image: &Arc<Image>, setup: &Setup, world: Box<dyn World>) -> Result<O
     };
     let can = SharedCan::new(options, world, serial.clone(), setup.host);
     let (watch, core) = (SharedWatch::default(), SharedCore::default());
+    core.lock().kept = image.kept_words;
     let fitting = Fitting {
         can: can.clone(),
         serial,

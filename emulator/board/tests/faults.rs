@@ -313,6 +313,20 @@ fn a_crystal_that_dies_under_torque_ends_the_torque_by_the_chips_own_oscillator(
 }
 
 #[test]
+fn a_crystal_that_dies_under_torque_ends_it_even_if_the_chip_is_reset_while_it_waits() {
+    // As by a debug probe that starts anew: its clock ends, and then it pulls the reset pin.
+    // In the copying before main, in the wait, while the frames leave.
+    for after_us in [300, 2_500, 4_500, 5_600] {
+        let reset_us = UNDER_TORQUE_US + after_us;
+        let story = tell_holding(0.9, &[format!("hse-dead@{UNDER_TORQUE_US}"), format!("reset@{reset_us}:pin")]);
+        let sent = story.sent_since(reset_us);
+        let frames: Vec<CanFrame> = sent.iter().map(|(_, frame)| *frame).collect();
+        assert_eq!(frames, safe_frames(), "{after_us}: {:?}", story.resets());
+        assert!(sent[0].0 - reset_us < 12_000, "{after_us}: {sent:?}");
+    }
+}
+
+#[test]
 fn a_crystal_that_dies_in_service_ends_the_image_and_not_the_arm() {
     let story = tell_with(0.7, &["hse-dead@600000"]);
     let resets = story.resets();

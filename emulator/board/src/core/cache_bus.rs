@@ -1,6 +1,8 @@
 //! The bus as the wrapped processor sees it: bank 2 through the data cache or past it, cache maintenance, and addresses
 //! where nothing is.
 
+use std::ops::Range;
+
 use rigless::emulator::{Access, AccessKind, Checked, CoreBus, InterruptLine, Queued};
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
@@ -33,6 +35,9 @@ const MEMORIES: [(u64, u64); 9] = [
     (0x3800_0000, 0x3800_FFFF),
     (0x3880_0000, 0x3880_0FFF),
 ];
+
+/// The tightly coupled data memory.
+const DATA_MEMORY: Range<u64> = 0x2000_0000..0x2002_0000;
 
 /// Address of FLASH.SR2, and its bits BSY and QW: an operation runs.
 const BANK_STATUS: u64 = 0x5200_2110;
@@ -164,6 +169,14 @@ impl CoreBus for CacheBus<'_> {
         }
         if access.kind == AccessKind::Write && self.is_lost(&access) {
             return Some(0);
+        }
+        if access.kind != AccessKind::Read && DATA_MEMORY.contains(&access.address) {
+            let inner = &mut *self.inner;
+            let read = |at: u32| {
+                let word = Access::new(AccessKind::Read, u64::from(at), Width::W32, 0);
+                inner.access(word, false).unwrap_or(0) as u32
+            };
+            self.shared.lock().partial.write(access.address as u32, access.width.bytes(), read);
         }
         let value = self.inner.access(access, from_code)?;
         if access.kind != AccessKind::Read {

@@ -28,9 +28,12 @@ pub(super) fn wait(from_service: bool) {
     if from_service && clock::within_early(HSE_LATE_US, ready) {
         return;
     }
-    reset::enter(Phase::Waiting);
     if from_service {
         own_oscillator::send(&stop_frames());
+    }
+    // Not before: after a reset while they leave they are sent again.
+    reset::enter(Phase::Waiting);
+    if from_service {
         reset::restart();
     }
     light::before_all(true);

@@ -28,7 +28,6 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use embassy_stm32::Peripherals;
 use puck::CanFrame;
-use reset::Phase;
 
 use super::constants::can;
 use crate::board::Parts;
@@ -64,7 +63,7 @@ impl crate::board::Board for SelectedBoard {
         tree::repair();
         clock::start();
         crystal::watch();
-        reset::enter(Phase::Start);
+        reset::enter_start(&cause);
         logger::start();
         let light = light::StatusLight::new(peripherals.PB14);
         pins::connect(pins::Pins {

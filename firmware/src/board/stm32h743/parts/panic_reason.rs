@@ -13,6 +13,9 @@ use link::frame::CRC;
 /// Bytes of words that are kept; the rest of a longer reason is lost.
 const WORDS_BYTES: usize = 500;
 
+// `write` goes over them by words of the memory.
+const _: () = assert!(WORDS_BYTES.is_multiple_of(size_of::<u32>()));
+
 /// First word of a record, so that random memory is refused before its length is believed.
 const MAGIC: u32 = 0x5441_4354;
 
@@ -62,6 +65,13 @@ pub(super) fn write(reason: fmt::Arguments<'_>) {
     let _ = pen.write_fmt(reason);
     // SAFETY: see `Place`; the mark comes last, when the rest is true.
     unsafe {
+        // Written by the byte, the last word would wait beside the memory for more, and a reset forgets it (RM0433
+        // 2.4). Writing other words whole does not drive it in.
+        let text = (&raw mut (*record).words).cast::<u32>();
+        for index in 0..pen.length.div_ceil(size_of::<u32>()) {
+            let word = text.add(index);
+            word.write_volatile(word.read_volatile());
+        }
         let crc = CRC.checksum((*record).words.get(..pen.length).unwrap_or(&[]));
         (&raw mut (*record).length).write_volatile(pen.length as u32);
         (&raw mut (*record).crc).write_volatile(crc);

@@ -24,6 +24,10 @@ pub(super) enum Phase {
     End = 0x5441_0004,
     /// The 8 MHz are waited for, and the bus was told so if anybody can have been left with a torque.
     Waiting = 0x5441_0005,
+    /// As [`Phase::Clocks`], behind a service: a motor may still hold a torque.
+    ClocksAfterService = 0x5441_0006,
+    /// As [`Phase::Start`], likewise.
+    StartAfterService = 0x5441_0007,
 }
 
 struct Place(UnsafeCell<MaybeUninit<u32>>);
@@ -60,20 +64,27 @@ pub(super) fn restart() -> ! {
 pub(super) struct Cause {
     /// For people.
     pub(super) words: &'static str,
-    /// Power has been there all the time, and the image was in service or at its end: a motor may hold a torque.
+    /// Power has been there all the time, and the image was in service, at its end, or in a start behind one of these
+    /// that was reset before it told anybody: a motor may hold a torque.
     pub(super) from_service: bool,
+}
+
+/// The clock tree runs, in a start of this cause.
+pub(super) fn enter_start(cause: &Cause) {
+    enter(if cause.from_service { Phase::StartAfterService } else { Phase::Start });
 }
 
 /// Takes what made the chip start, and begins the first phase. Called first of all, once.
 pub(super) fn take_cause() -> Cause {
+    const OWED: [Phase; 4] = [Phase::Service, Phase::End, Phase::ClocksAfterService, Phase::StartAfterService];
     let phase = phase();
-    enter(Phase::Clocks);
     let flags = RCC.rsr().read();
-    // So that the next start tells its own.
-    RCC.rsr().modify(|w| w.set_rmvf(true));
     // Every reset also pulls the reset pin, and power also reports brown-out: the most telling cause first.
     let has_power = !(flags.porrstf() || flags.borrstf());
-    let from_service = has_power && (phase == Phase::Service as u32 || phase == Phase::End as u32);
+    let from_service = has_power && OWED.iter().any(|owed| *owed as u32 == phase);
+    enter(if from_service { Phase::ClocksAfterService } else { Phase::Clocks });
+    // So that the next start tells its own. Behind the phase, which without these flags would be believed.
+    RCC.rsr().modify(|w| w.set_rmvf(true));
     let words = if flags.iwdg1rstf() || flags.wwdg1rstf() {
         by_watchdog(phase)
     } else if flags.sftrstf() {
@@ -91,12 +102,14 @@ pub(super) fn take_cause() -> Cause {
 /// Where the watchdog met the image.
 fn by_watchdog(phase: u32) -> &'static str {
     const CLOCKS: u32 = Phase::Clocks as u32;
+    const CLOCKS_AGAIN: u32 = Phase::ClocksAfterService as u32;
     const START: u32 = Phase::Start as u32;
+    const START_AGAIN: u32 = Phase::StartAfterService as u32;
     const SERVICE: u32 = Phase::Service as u32;
     const END: u32 = Phase::End as u32;
     match phase {
-        CLOCKS => "the watchdog: the clock tree did not run after 512 ms",
-        START => "the watchdog: no control slot had begun 512 ms after the start",
+        CLOCKS | CLOCKS_AGAIN => "the watchdog: the clock tree did not run after 512 ms",
+        START | START_AGAIN => "the watchdog: no control slot had begun 512 ms after the start",
         SERVICE => "the watchdog: no control slot had begun for 10 ms",
         END => "the watchdog, at the end of the image",
         _ => "the watchdog",
