@@ -113,6 +113,47 @@ fn a_movement_that_no_arm_would_play_is_not_learned() {
     }
 }
 
+/// The changes that make it fail: `--no-trim` is advised for every movement that was led slowly, also where it is
+/// refused then; the command line is repeated with `--still-speed` beside it, which is no use of the two.
+#[test]
+fn a_movement_that_was_led_slowly_is_learned_whole_where_an_arm_plays_that_long() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (duration, option, is_playable) in [
+        (100.0, "", true),
+        (100.0, "--still-speed 0.004", true),
+        (115.0, "--dwell 10", false),
+        (150.0, "", false),
+        (150.0, "--speed 2", true),
+    ] {
+        // At 2 mm/s, and over 8 cm.
+        let line = |line: u32| {
+            let part = a_fifth(f64::from(line) / (duration * 50.0));
+            format!("{},{}\n", f64::from(line) / 50.0, part.map(|angle| format!("{angle:.6}")).join(","))
+        };
+        let lines = (0..=(duration * 50.0) as u32).map(line).collect::<String>();
+        std::fs::write(folder.join("slow.csv"), HEAD.to_owned() + &lines).unwrap();
+        let line = format!("learn --force slow.csv -o a.toml {option}");
+        let refused = tactus(folder, &line);
+        assert_eq!(refused.status.code(), Some(6), "{line}: {}", said(&refused));
+        let words = said(&refused);
+        let help = words.lines().find_map(|line| line.trim().strip_prefix("help: ")).unwrap_or_default();
+        if is_playable {
+            let again = help.strip_prefix("tactus ").unwrap_or_default();
+            let learned = tactus(folder, again);
+            assert!(learned.status.success(), "{help}: {}", said(&learned));
+        } else {
+            assert_eq!(help, "show it faster, or in parts", "{line}");
+        }
+    }
+}
+
+/// The posture at a part of the usual movement, a fifth as far from its start.
+fn a_fifth(part: f64) -> [f64; 7] {
+    let (start, at) = (common::START, common::posture(part));
+    std::array::from_fn(|joint| start[joint] + 0.2 * (at[joint] - start[joint]))
+}
+
 #[test]
 fn a_recording_of_an_arm_that_stands_is_not_said_to_be_learnable() {
     let folder = tempfile::tempdir().unwrap();

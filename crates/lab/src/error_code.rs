@@ -299,8 +299,9 @@ error_codes! {
     PrimitiveInvalid = 633: "a value of the primitive is not valid",
         "the file was changed, or learned with options out of range",
         "learn the primitive again, see `tactus learn --help`";
-    ExpectationStale = 634: "the expected force is for another model or duration",
-        "the primitive was changed after its rehearsal", "record it again with `tactus rehearse`";
+    ExpectationStale = 634: "the expected force is for another model, duration or filter",
+        "the primitive was changed after its rehearsal, or rehearsed with another version",
+        "record it again with `tactus rehearse`";
     NoExpectation = 635: "the primitive has no expected forces", "it was never rehearsed",
         "record it with `tactus rehearse`, or run with `--mode open`";
     ExpectationSpeed = 636: "the expected force was recorded at a speed too different", "`--speed`",

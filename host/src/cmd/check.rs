@@ -67,7 +67,9 @@ pub(super) fn failure(cause: PrimitiveFileError, path: &Path, doing: &str) -> Fa
     let refused = format!("{doing} refused");
     let code = match &cause {
         PrimitiveFileError::Model { .. } => ErrorCode::PrimitiveModel,
-        PrimitiveFileError::ExpectationModel { .. } | PrimitiveFileError::ExpectationDuration { .. } => {
+        PrimitiveFileError::ExpectationModel { .. }
+        | PrimitiveFileError::ExpectationDuration { .. }
+        | PrimitiveFileError::ExpectationFilter { .. } => {
             return Failure::new(ErrorCode::ExpectationStale, refused, cause)
                 .help(format!("record it again: `tactus rehearse {}`", quoted::path(path)));
         }

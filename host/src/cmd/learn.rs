@@ -182,8 +182,9 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
         LearnError::Poor { .. } | LearnError::Fit { .. } if command.cutoff < CUTOFF => {
             Some(format!("a higher `--cutoff` ({CUTOFF} Hz is usual): the filter takes the movement away"))
         }
-        LearnError::Demonstration(DemonstrationError::Still { extent, .. }) if *extent > SLOW_EXTENT => {
-            Some(again("--no-trim"))
+        LearnError::Demonstration(DemonstrationError::Still { extent, duration, .. }) if *extent > SLOW_EXTENT => {
+            let is_playable = duration / command.speed + command.dwell <= LONGEST_MOVEMENT;
+            Some(if is_playable { again_whole() } else { "show it faster, or in parts".to_owned() })
         }
         LearnError::Demonstration(DemonstrationError::Recording(RecordingError::NoRadians { .. })) => {
             Some("convert the joint angles to radians".to_owned())
@@ -211,11 +212,32 @@ fn failure(error: LearnError, command: &Cmd) -> Failure {
     }
 }
 
+/// The words of this command line.
+fn given() -> Vec<String> {
+    std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect()
+}
+
 /// The command line once more, with another option: all that was asked for beside it, wherever it stands, must not be
 /// lost.
 fn again(option: &str) -> String {
-    let given = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
-    again_with(given.collect(), option)
+    again_with(given(), option)
+}
+
+/// The command line once more for the whole recording, of which no speed says any more what belongs to the movement.
+fn again_whole() -> String {
+    again_with(without(given(), "--still-speed"), "--no-trim")
+}
+
+/// These words without an option and its value.
+fn without(mut words: Vec<String>, option: &str) -> Vec<String> {
+    let end = words.iter().position(|word| word == "--").unwrap_or(words.len());
+    let joined = |word: &str| word.strip_prefix(option).is_some_and(|rest| rest.starts_with('='));
+    if let Some(at) = words[..end].iter().position(|word| word == option) {
+        words.drain(at..end.min(at + 2));
+    } else if let Some(at) = words[..end].iter().position(|word| joined(word)) {
+        words.remove(at);
+    }
+    words
 }
 
 /// These words with another option, which stands before a `--`: behind it nothing is one.
@@ -269,5 +291,13 @@ mod tests {
         assert_eq!(again("--force learn a.csv"), "tactus --force learn a.csv --no-trim");
         assert_eq!(again("--device learn learn -- -a.csv"), "tactus --device learn learn --no-trim -- -a.csv");
         assert_eq!(again_with(vec!["learn".to_owned(), "my a.csv".to_owned()], "-x"), "tactus learn 'my a.csv' -x");
+    }
+
+    #[test]
+    fn an_option_is_left_out_with_its_value_and_a_file_of_its_name_is_none() {
+        let rest = |line: &str| without(line.split(' ').map(str::to_owned).collect(), "--still-speed").join(" ");
+        assert_eq!(rest("learn --still-speed 0.001 a.csv"), "learn a.csv");
+        assert_eq!(rest("learn a.csv --still-speed=0.001 -o b.toml"), "learn a.csv -o b.toml");
+        assert_eq!(rest("learn -- --still-speed"), "learn -- --still-speed");
     }
 }

@@ -3,7 +3,7 @@
 use std::vec::Vec;
 
 use super::{Demonstration, FIT_CAPACITY, PoseSamples, WARNING_ANGLE, largest_angle_to_goal};
-use crate::{Coupling, Primitive, Rollout, StartState};
+use crate::{Coupling, Primitive, Quaternion, Rollout, StartState};
 
 /// Quality of one row.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,8 +37,8 @@ pub struct OrientationReport {
     pub wide: bool,
 }
 
-/// Quality of a fit. The replay starts with the demonstrated velocity and is compared with the smoothed demonstration;
-/// what the smoothing took away is reported beside it.
+/// Quality of a fit. The replay starts with the demonstrated velocity, goes in steps of the control period and is
+/// compared with the smoothed demonstration; what the smoothing took away is reported beside it.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
@@ -124,26 +124,40 @@ pub(super) fn replay<const D: usize, const P: usize>(
     report
 }
 
-/// The samples of a run at the instants of the demonstration. `None` if a step is refused: the demonstrated start of a
-/// checked primitive is always accepted, and so is each step with that primitive.
+/// The samples of a run at the instants of the demonstration, between two ticks by interpolation: where the control
+/// period is the longer one, its steps are those that the fit has made up for. `None` if a step is refused: the
+/// demonstrated start of a checked primitive is always accepted, and so is each step with that primitive.
 fn roll_out<const D: usize, const P: usize>(
     demonstration: &Demonstration<D, P>,
     primitive: &Primitive<f64, D, P, FIT_CAPACITY>,
 ) -> Option<Demonstration<D, P>> {
     let mut rollout = Rollout::start(primitive, &StartState::demonstrated(primitive)).ok()?;
-    let steps = libm::ceil(demonstration.period() / primitive.control_period() - 1e-6).max(1.0);
-    let dt = (demonstration.period() / steps).min(primitive.control_period());
-    let mut samples = Vec::with_capacity(demonstration.len());
-    for _ in 0..demonstration.len() {
-        samples.push(rollout.step(primitive, dt, &Coupling::NONE).ok()?);
-        for _ in 1..steps as usize {
-            rollout.step(primitive, dt, &Coupling::NONE).ok()?;
+    let (period, longest) = (demonstration.period(), primitive.control_period());
+    let steps = libm::ceil(period / longest - 1e-6).max(1.0);
+    let dt = if longest > period { longest } else { (period / steps).min(longest) };
+    let mut tick = || rollout.step(primitive, dt, &Coupling::NONE).ok();
+    let (mut ticks, mut before, mut after) = (0.0, tick()?, tick()?);
+    let mut poses = [const { PoseSamples { position: Vec::new(), orientation: Vec::new() } }; P];
+    let mut points = Vec::with_capacity(demonstration.len());
+    for k in 0..demonstration.len() {
+        let place = k as f64 * period / dt;
+        while place >= ticks + 1.0 {
+            (before, after) = (after, tick()?);
+            ticks += 1.0;
         }
+        let share = place - ticks;
+        for ((samples, a), b) in poses.iter_mut().zip(&before.poses).zip(&after.poses) {
+            let (from, to) = (&a.orientation.quaternion, &b.orientation.quaternion);
+            let way = from.conjugate().product(&to.aligned_with(from)).rotation_vector().map(|r| share * r);
+            samples.position.push(between(&a.position.x, &b.position.x, share));
+            samples.orientation.push(from.product(&Quaternion::from_rotation_vector(&way)));
+        }
+        points.push(between(&before.points.x, &after.points.x, share));
     }
-    let poses = core::array::from_fn(|n| PoseSamples {
-        position: samples.iter().map(|row| row.poses[n].position.x).collect(),
-        orientation: samples.iter().map(|row| row.poses[n].orientation.quaternion).collect(),
-    });
-    let points = samples.iter().map(|row| row.points.x).collect();
-    Demonstration::new(demonstration.period(), poses, points).ok()
+    Demonstration::new(period, poses, points).ok()
+}
+
+/// The values at this share of the way from one tick to the next.
+fn between<const R: usize>(from: &[f64; R], to: &[f64; R], share: f64) -> [f64; R] {
+    core::array::from_fn(|i| from[i] + share * (to[i] - from[i]))
 }

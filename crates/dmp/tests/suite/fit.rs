@@ -505,3 +505,28 @@ fn a_movement_taught_and_run_at_another_rate_is_the_same_movement() {
         assert!(worst < 2e-3, "{period} s: {worst}");
     }
 }
+
+/// The change that makes it fail: the replay of the report goes at the sampling period of the demonstration.
+#[test]
+fn the_report_of_a_fit_for_a_slower_control_is_that_of_its_runs() {
+    for (control_period, longest) in [(0.02, 3e-4), (0.007, 3e-5), (0.001, 3e-5), (0.0003, 3e-5)] {
+        let samples: Vec<[f64; 1]> = minimum_jerk([0.0], [1.0], 3001);
+        let shown = dmp::fit::Demonstration::<1, 0>::new(0.001, [], samples).unwrap();
+        let options = dmp::fit::FitOptions { control_period: Some(control_period), ..Default::default() };
+        let report = fit(&shown, &options).unwrap().report.rows[0];
+        assert!(report.max < longest, "at {control_period} s off by {} rad", report.max);
+    }
+}
+
+#[cfg(feature = "fixed")]
+#[test]
+fn weights_that_fixed_point_does_not_keep_are_refused_as_such() {
+    let samples: Vec<f64> = (0..=1000).map(|k| (f64::from(k) * 0.002 * PI).sin()).collect();
+    let shown = dmp::fit::Demonstration::of_row(0.002, &samples).unwrap();
+    let learned = fit(&shown, &Default::default()).unwrap();
+    let largest = learned.weights.iter().fold(0.0_f64, |largest, weight| largest.max(weight.abs()));
+    assert!((140.0..160.0).contains(&largest), "{largest}");
+    let kept = learned.primitive::<dmp::FixedPoint, 50>();
+    assert_eq!(kept.unwrap_err(), dmp::PrimitiveError::Weight);
+    assert!(learned.primitive::<f32, 50>().is_ok());
+}

@@ -257,6 +257,8 @@ pub enum DemonstrationError {
         threshold: f64,
         /// Extent of all that was recorded, m.
         extent: f64,
+        /// Duration of all that was recorded, s.
+        duration: f64,
     },
     /// The movement is over too soon or too late.
     #[error(

@@ -142,7 +142,8 @@ impl Demonstration {
     /// will see is the one its own kinematics makes of them.
     ///
     /// # Errors
-    /// The recording has no pose, has a gap longer than [`LONGEST_GAP`], or the arm hardly moves in it.
+    /// The recording has no pose, is shorter than a control period, has a gap longer than [`LONGEST_GAP`], or the arm
+    /// hardly moves in it.
     pub fn prepare(recording: &Recording, preparation: &Preparation) -> Result<Demonstration, DemonstrationError> {
         let (gap, behind) = recording.longest_gap;
         // Times of few digits: a tenth of a second of a recording at 10 Hz is not more than one.
@@ -161,6 +162,11 @@ impl Demonstration {
         }
         leap::refuse(recording)?;
         let grid = resample::grid(&recording.time, 1.0 / RATE);
+        if grid.len() < 2 {
+            // Nothing lies between one point and none, and no speed can be told.
+            let duration = recording.time[recording.len() - 1] - recording.time[0];
+            return Err(DemonstrationError::Duration { file: recording.file.clone(), duration });
+        }
         let q = recording.q.as_ref().map(|values| resample::vectors(&recording.time, values, &grid));
         let (position, orientation, pose_source) = match (&q, &recording.position, &recording.orientation) {
             (Some(q), _, _) => {
@@ -220,6 +226,7 @@ impl Demonstration {
                 needed: FEWEST_SAMPLES as f64 / RATE,
                 threshold,
                 extent: self.extent(),
+                duration: self.duration(),
             });
         }
         let (first, last) = (first.saturating_sub(REST), (last + REST).min(end));

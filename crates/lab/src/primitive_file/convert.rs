@@ -87,7 +87,8 @@ impl PrimitiveFile {
     /// The image that is uploaded: single precision, checked by reading it back.
     ///
     /// # Errors
-    /// [`PrimitiveFileError::Image`], for example for more kernels than an image can hold.
+    /// [`PrimitiveFileError::Image`], for example for more kernels than an image can hold;
+    /// [`PrimitiveFileError::StatisticsAlone`] and [`PrimitiveFileError::ExpectationFilter`], which no device takes.
     pub fn to_image(&self) -> Result<Vec<u8>, PrimitiveFileError> {
         self.require_expectation()?;
         let refused = |cause| PrimitiveFileError::Image { file: self.file.clone(), cause };
@@ -98,6 +99,11 @@ impl PrimitiveFile {
         let (expectation, statistics) = (self.expectation.as_ref(), self.statistics.as_ref());
         if statistics.is_some() && expectation.is_none() {
             return Err(PrimitiveFileError::StatisticsAlone { file: self.file.clone() });
+        }
+        let cut_off = expectation.map(|table| table.filter_cutoff);
+        if let Some(found) = cut_off.filter(|cut_off| device::recorded_filter::check(*cut_off as f32).is_err()) {
+            let expected = control::sense::wrench::WRENCH_CUT_OFF;
+            return Err(PrimitiveFileError::ExpectationFilter { file: self.file.clone(), found, expected });
         }
         let content = ImageContent::<&[f32]> {
             model_hash: self.model_hash,

@@ -122,4 +122,14 @@ pub enum PrimitiveFileError {
         /// Hash of the movement.
         expected: u32,
     },
+    /// The expectation was recorded through another filter than the one that every device of this version has.
+    #[error("{file}: [expectation]: recorded through a filter of {found} Hz, that of the device has {expected} Hz", file = file.display())]
+    ExpectationFilter {
+        /// The file.
+        file: PathBuf,
+        /// Cut-off in the file, Hz.
+        found: f64,
+        /// Cut-off of the device, Hz.
+        expected: f64,
+    },
 }

@@ -22,6 +22,7 @@ pub(crate) const STEP: Duration = Duration::from_nanos(1_111_111);
 /// A control half that takes every command and does what it says at once.
 pub(crate) struct Half {
     pub(crate) state: State,
+    pub(crate) hand: link::HandStage,
     pub(crate) commands: Vec<Command>,
     pub(crate) events: VecDeque<Event>,
     pub(crate) records: VecDeque<TimedRecord>,
@@ -79,7 +80,7 @@ impl SessionPort<DeviceController> for Half {
             safety_mode: None,
             pendant: None,
             temperatures: [None; 7],
-            hand: link::HandStage::Absent,
+            hand: self.hand,
             hand_moves: false,
             hand_temperatures: [None; 4],
             counters: Counters::default(),
@@ -135,6 +136,7 @@ impl Device {
             session,
             half: Half {
                 state: State::Hold,
+                hand: link::HandStage::Absent,
                 commands: Vec::new(),
                 events: VecDeque::new(),
                 records: VecDeque::new(),

@@ -1,5 +1,6 @@
 //! The client against the device's own session: handshake, loss, silence, uploads, stopping.
 
+mod agreement;
 mod fixture;
 mod secret;
 #[cfg(unix)]
@@ -375,6 +376,28 @@ fn an_interrupt_long_after_a_motion_of_the_hand_lets_an_arm_that_holds_be() {
         assert_eq!(matches!(error, HostError::Interrupted), stops, "{error:?} after {seconds} s");
         assert_eq!(client.transport().half.state == State::SoftStop, stops, "after {seconds} s");
     }
+}
+
+/// The fingers and then the spread have ten seconds each.
+///
+/// The change that makes it fail: an initialisation counts as over after ten seconds, whatever the status tells.
+#[test]
+fn an_interrupt_stops_a_hand_that_is_initialised_for_longer_than_usual() {
+    let mut client = connected();
+    let interrupt = Interrupt::never();
+    client.set_interrupt(interrupt.clone());
+    client.hold().unwrap();
+    client.initialise_hand().unwrap();
+    client.transport().half.hand = link::HandStage::Initialising;
+    let end = client.now() + Duration::from_secs(18);
+    while client.now() < end {
+        client.next(Duration::from_millis(50)).unwrap();
+        client.status().unwrap();
+    }
+    interrupt.raise();
+    let error = client.next(Duration::from_secs(10)).unwrap_err();
+    assert!(matches!(error, HostError::Interrupted), "{error:?}");
+    assert_eq!(client.transport().half.state, State::SoftStop);
 }
 
 #[test]
