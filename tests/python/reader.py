@@ -33,6 +33,24 @@ assert np.abs(a - b).max() < 0.005, np.abs(a - b).max()
 count = min(len(run), len(fast))
 assert np.abs(run.position[:count] - fast.position[:count]).max() > 0.05
 
+# Two runs that somebody looking on recorded are two, and what a run that was stopped did not play is not known.
+lines = (folder / "run.csv").read_text().splitlines(keepends=True)
+head = next(number for number, line in enumerate(lines) if not line.startswith("#"))
+(folder / "both.csv").write_text("\ufeff" + "".join(lines + lines[head + 1:]), encoding="utf-8")
+both = tr.read_recording(folder / "both.csv")
+assert both.notes == run.notes and [len(one) for one in both.movements()] == 2 * [run.is_running.sum()]
+try:
+    tr.align([both], "position")
+except ValueError as error:
+    assert "2 movements" in str(error), error
+else:
+    raise AssertionError("two movements were aligned as one")
+stopped = both.movements()[1]
+(folder / "stopped.csv").write_text("".join(lines[:head + 1 + np.argmax(run.progress() > 0.5)]))
+_, (whole, part) = tr.align([stopped, tr.read_recording(folder / "stopped.csv")], "position", alpha=movement["alpha"])
+assert np.isfinite(whole).all() and np.isnan(part[60:]).all()
+assert np.allclose(part[:45], whole[:45]), np.abs(part[:45] - whole[:45]).max()
+
 torn = folder / "torn.csv.part"
 torn.write_text((folder / "run.csv").read_text()[:-20])
 assert len(tr.read_recording(torn)) == len(run) - 1

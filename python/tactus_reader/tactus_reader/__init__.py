@@ -4,6 +4,7 @@ SI units and radians. The world frame has its origin where the axes of J1 and J2
 """
 
 import csv
+import io
 import math
 import pathlib
 import tomllib
@@ -16,6 +17,12 @@ SCHEMA = "tactus-primitive/1"
 
 # Decay of the phase over a movement, where no primitive says otherwise: s ends at 0.01.
 ALPHA = math.log(100)
+
+# A phase that is larger than the one before it by this factor is that of a movement begun anew: within one it only falls.
+ANEW = 1.1
+
+# Progress up to which the first and the last cycle of a movement stand for what was not recorded beside them.
+REACH = 0.01
 
 # Columns that belong together. A quantity exists if all its columns do.
 QUANTITIES = {
@@ -75,6 +82,18 @@ class Recording:
         """True in the cycles in which a movement is played."""
         return self.columns["phase"] > 0
 
+    def movements(self):
+        """The movements that were played, each as a recording of its own: one that somebody looking on made may hold
+        several."""
+        phase, running = self.columns["phase"], self.is_running
+        begins = running.copy()
+        begins[1:] &= ~running[:-1] | (phase[1:] > ANEW * phase[:-1])
+        number = np.cumsum(begins)
+        return [self._part(running & (number == which)) for which in range(1, number.max(initial=0) + 1)]
+
+    def _part(self, rows):
+        return Recording(self.path, self.notes, {name: values[rows] for name, values in self.columns.items()})
+
     def progress(self, alpha=ALPHA):
         """Part of the movement that is played, 0 to 1 and beyond, from its phase; NaN outside of a movement."""
         with np.errstate(divide="ignore"):
@@ -86,8 +105,8 @@ def read_recording(path):
     """Reads a recording, or the `.part` of one that was cut off. Raises ValueError where it is none."""
     path = pathlib.Path(path)
     notes, rows = {}, []
-    text = path.read_text(encoding="utf-8")
-    for number, line in enumerate(text.splitlines(keepends=True), 1):
+    text = path.read_text(encoding="utf-8-sig")
+    for number, line in enumerate(io.StringIO(text), 1):
         if line.startswith("#"):
             key, separator, value = line[1:].partition(": ")
             if separator:
@@ -135,18 +154,23 @@ def align(recordings, quantity, points=101, alpha=ALPHA):
     """A quantity of several runs at equal progress of the movement.
 
     Returns the progress, `points` values from 0 to 1, and an array runs x points x columns. Progress is that of the
-    phase, so that runs at different speeds, and runs that were slowed, can be compared. `alpha` is
-    `primitive["movement"]["alpha"]`.
+    phase, so that runs at different speeds, and runs that were slowed, can be compared. What was not played, of a run
+    that was stopped, is NaN. `alpha` is `primitive["movement"]["alpha"]`.
+
+    Raises ValueError where a recording holds no movement, or several: `movements` parts them.
     """
     progress = np.linspace(0, 1, points)
     aligned = []
     for recording in recordings:
-        running = recording.is_running
-        if not running.any():
+        movements = recording.movements()
+        if not movements:
             raise ValueError(f"{recording.path} holds no movement: its phase is 0 throughout")
-        at = recording.progress(alpha)[running]
-        values = getattr(recording, quantity)[running]
-        aligned.append(np.column_stack([np.interp(progress, at, column) for column in values.T]))
+        if len(movements) > 1:
+            raise ValueError(f"{recording.path} holds {len(movements)} movements: take one of `movements()`")
+        at, values = movements[0].progress(alpha), getattr(movements[0], quantity)
+        runs = np.column_stack([np.interp(progress, at, column) for column in values.T])
+        runs[(progress < at[0] - REACH) | (progress > at[-1] + REACH)] = np.nan
+        aligned.append(runs)
     return progress, np.array(aligned)
 
 
