@@ -153,7 +153,14 @@ impl Log {
         let failed = |cause| ResultsError::File { file: self.path.clone(), cause };
         let mut line = serde_json::to_string(content).map_err(|error| failed(error.into()))?;
         line.push('\n');
-        self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush()).map_err(failed)
+        let length = self.file.metadata().map_err(failed)?.len();
+        let written = self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush());
+        if written.is_err() {
+            // Other trials end meanwhile, and the disk may have room again: their lines must not go on behind half a
+            // one. Where it cannot be cut off, the failure of the line is the one to tell.
+            let _ = self.file.set_len(length);
+        }
+        written.map_err(failed)
     }
 }
 
@@ -267,6 +274,35 @@ mod tests {
         made[..2].iter().for_each(|report| log.add(report).unwrap());
         drop(log);
         assert_eq!(Log::open(folder.path(), &header("torch"), true).unwrap().1, made[..2]);
+    }
+
+    /// Set in the process of this test that has a limit for files: the folder of its results.
+    const FOLDER_WITHOUT_ROOM: &str = "TACTUS_TEST_FOLDER_WITHOUT_ROOM";
+
+    /// A limit for files stands for a full disk; this test is run once more below it, in a process of its own.
+    ///
+    /// The change that makes it fail: `Log::line` that leaves what the disk took of a line.
+    #[test]
+    fn a_full_disk_leaves_no_half_line_to_which_the_next_trial_would_be_added() {
+        let made = fixtures::results(&[1]).reports;
+        if let Some(folder) = std::env::var_os(FOLDER_WITHOUT_ROOM) {
+            let (mut log, _) = Log::open(folder.as_ref(), &header("torch"), false).unwrap();
+            let kept = made.iter().take_while(|report| log.add(report).is_ok()).count();
+            assert!(0 < kept && kept < made.len(), "{kept}");
+            let text = std::fs::read_to_string(&log.path).unwrap();
+            assert!(text.ends_with('\n') && text.lines().count() == kept + 1, "{kept}: {text}");
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let line = "trap '' XFSZ; ulimit -f 64; exec \"$0\" --exact --nocapture \"$1\"";
+        let name = "log::tests::a_full_disk_leaves_no_half_line_to_which_the_next_trial_would_be_added";
+        let mut limited = std::process::Command::new("sh");
+        limited.args(["-c", line]).arg(std::env::current_exe().unwrap()).arg(name);
+        let ended = limited.env(FOLDER_WITHOUT_ROOM, folder.path()).output().unwrap();
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+        assert!(String::from_utf8_lossy(&ended.stdout).contains("1 passed"), "the test below the limit did not run");
+        let there = Log::open(folder.path(), &header("torch"), true).unwrap().1;
+        assert_eq!(there, made[..there.len()]);
     }
 
     /// The change that makes it fail: `Log::open`, which cuts off the line that another program is writing.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::observation::{Milestones, Observation, SAMPLE_SECONDS, Sample};
 use super::quantile::quantile;
-use super::shaking::UNSTABLE;
+use super::shaking::{Shaking, UNSTABLE};
 
 /// An object that leaned farther than this before the grasp closed counts as knocked over.
 pub const TILT_LIMIT: f64 = 30.0 * std::f64::consts::PI / 180.0;
@@ -162,7 +162,7 @@ pub struct Measures {
     /// arm that stopped before.
     #[serde(default)]
     pub chatter_n: Option<f64>,
-    /// Largest [amplitude](crate::shaking::amplitude) of a joint's speed above 15 Hz, rad/s.
+    /// Largest [amplitude](crate::shaking::Shaking::largest) of a joint's speed above 15 Hz, rad/s.
     #[serde(default)]
     pub shaking_rad_s: f64,
     /// True if a fault stopped the arm, that of an arm that shakes included.
@@ -211,8 +211,8 @@ pub struct Rule {
 pub struct ArmConduct<'a> {
     /// Name of the fault that stopped the arm, if one did.
     pub fault: Option<&'a str>,
-    /// Amplitude of its [shaking](crate::shaking), rad/s.
-    pub shaking: f64,
+    /// Its shaking.
+    pub shaking: Shaking,
 }
 
 /// Outcome of a trial in which the arm was stopped by this fault.
@@ -252,7 +252,7 @@ pub fn judge(
         Outcome::KnockedOver
     } else if is_lifted(last, first) && observation.at(marks.hold).is_some_and(|sample| is_lifted(sample, first)) {
         Outcome::Held
-    } else if shaking > UNSTABLE {
+    } else if shaking.lasting > UNSTABLE {
         Outcome::Unstable
     } else if lifted.iter().any(|sample| height(sample) > RAISED) {
         Outcome::Dropped
@@ -295,7 +295,7 @@ pub fn judge(
         contact_mean_n: mean_since(forces.iter().skip_while(|force| **force <= TOUCH)),
         finger_n: last.contact.fingers,
         table_peak_n: whole.iter().map(|sample| sample.contact.table).fold(0.0, f64::max),
-        shaking_rad_s: shaking,
+        shaking_rad_s: shaking.largest,
         stopped: fault.is_some(),
         ..Measures::of_fingers(whole)
     };
@@ -516,7 +516,7 @@ mod tests {
 
     #[test]
     fn an_arm_that_shakes_is_the_cause_of_a_failure_and_is_told_with_a_success() {
-        let conduct = |shaking| ArmConduct { fault: None, shaking };
+        let conduct = |lasting| ArmConduct { fault: None, shaking: Shaking { largest: 0.4, lasting } };
         let (outcome, measures) = judge(&good(), &MILESTONES, UPRIGHT, conduct(0.4));
         assert_eq!((outcome, measures.shaking_rad_s), (Outcome::Held, 0.4));
         let mut observation = good();

@@ -191,7 +191,7 @@ pub fn run(
     }
     let results = Results::new(reports);
     if config.keep_traces {
-        repeat_representative(config, &prepared, &results, &mut trials, interrupt)?;
+        repeat_representative(config, &prepared, &results, &mut trials, interrupt, [results.reports.len(), all])?;
     }
     trials.sort_by_key(|trial| trial.report.key);
     Ok(Experiment { results, trials, prepared })
@@ -231,7 +231,7 @@ fn of_what_is_there(
     }
     let mut trials = Vec::new();
     if config.keep_traces {
-        repeat_representative(config, &prepared, &results, &mut trials, interrupt)?;
+        repeat_representative(config, &prepared, &results, &mut trials, interrupt, [done, all])?;
     }
     Ok(Experiment { results, trials, prepared })
 }
@@ -243,18 +243,23 @@ fn keep(config: &Config, log: Option<&mut Log>, trial: &Trial) -> Result<(), Exp
 }
 
 /// Repeats the trials of the representative cell that have left no trace because their results were there from before:
-/// the same key, the same trial.
+/// the same key, the same trial. So many trials of all that are wanted are kept by then.
 fn repeat_representative(
     config: &Config,
     prepared: &Prepared,
     results: &Results,
     trials: &mut Vec<Trial>,
     interrupt: &Interrupt,
+    [done, all]: [usize; 2],
 ) -> Result<(), ExperimentError> {
     for key in representative(results) {
         if !trials.iter().any(|trial| trial.report.key == key) {
             let repeated = trial::run(config, prepared, key, interrupt);
-            trials.push(repeated.map_err(|cause| ExperimentError::Trial { key, cause })?);
+            trials.push(repeated.map_err(|cause| match interrupt.is_raised() {
+                // An interrupted trial is no failed one.
+                true => ExperimentError::Interrupted { done, all },
+                false => ExperimentError::Trial { key, cause },
+            })?);
         }
     }
     Ok(())
@@ -295,4 +300,33 @@ fn record(folder: &Path, trial: &Trial) -> Result<(), ExperimentError> {
     );
     let text = recording_text(&trial.telemetry, &notes).map_err(failed)?;
     lab::output_file::replace(&file, text.as_ref()).map_err(|error| failed(error.into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use lab::demonstration::Recording;
+    use lab::learn::{LearnOptions, learn};
+
+    use super::*;
+    use crate::fixtures;
+    use crate::scenario::Scenario;
+
+    /// All trials were through, and the experiment ended as if one of them could not be carried through.
+    ///
+    /// The change that makes it fail: whatever ends a repeated trial is a failure of it.
+    #[test]
+    fn who_interrupts_the_repetition_for_a_figure_is_told_what_is_kept() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/reach.csv");
+        let recording = Recording::read(&file).unwrap();
+        let primitive = learn(&recording, Path::new("reach.toml"), &LearnOptions::named("reach")).unwrap().primitive;
+        let config = Config::new(Scenario::Flashlight, primitive);
+        let (prepared, results) = (Prepared::of(&config).unwrap(), fixtures::results(&[1]));
+        let interrupt = Interrupt::never();
+        interrupt.raise();
+        let mut trials = Vec::new();
+        let ended = repeat_representative(&config, &prepared, &results, &mut trials, &interrupt, [144, 144]);
+        assert!(matches!(ended, Err(ExperimentError::Interrupted { done: 144, all: 144 })), "{ended:?}");
+    }
 }

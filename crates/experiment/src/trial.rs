@@ -17,7 +17,7 @@ use super::observed::{ObservedWorld, Snapshot};
 use super::outcome::{self, ArmConduct};
 use super::plant::{self, Arm};
 use super::results::{Key, PlanarPath, Report, Surprise};
-use super::shaking;
+use super::shaking::Shaking;
 use super::trace::{Cycle, Trace};
 use lab::client::{Client, Incoming, Interrupt};
 use lab::device::Device;
@@ -192,7 +192,7 @@ pub fn run(config: &Config, prepared: &Prepared, key: Key, interrupt: &Interrupt
     let lift = if config.scenario.lifts_itself() { run + rise(&trace, arrived - run) } else { arrived };
     let marks = Milestones { run, lift, hold };
     let (observation, snapshots) = take_observation(&mut client);
-    let conduct = ArmConduct { fault: fault.as_deref(), shaking: shaking::amplitude(&telemetry) };
+    let conduct = ArmConduct { fault: fault.as_deref(), shaking: Shaking::of(&telemetry) };
     let (outcome, mut measures) = outcome::judge(&observation, &marks, config.rule(), conduct);
     (measures.finger_asked_n, measures.chatter_n) = (asked(config), trace.chatter(measures.closed(), measures.lift_s));
     let movement = (config.primitive.movement.duration / config.variation.speed).min(measures.lift_s);

@@ -21,7 +21,11 @@ pub(super) fn failure(error: ExperimentError, command: &Cmd) -> Failure {
         ExperimentError::OutOfReach(_) => Failure::new(ErrorCode::OutOfReach, REFUSED, error),
         ExperimentError::Results(error) => refusal::of(error, command),
         ExperimentError::Interrupted { .. } => {
-            Failure::new(ErrorCode::Interrupted, DOING, error).help("`--resume` goes on from here")
+            let help = match command.figures_only {
+                true => "the same command once more makes the figures",
+                false => "`--resume` goes on from here",
+            };
+            Failure::new(ErrorCode::Interrupted, DOING, error).help(help)
         }
         ExperimentError::Primitive(cause) => trial_failure(cause),
         ExperimentError::Trial { .. } => Failure::new(ErrorCode::TrialFailed, DOING, error),
