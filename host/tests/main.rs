@@ -10,6 +10,7 @@ mod served_arm;
 mod tool;
 
 mod advice;
+mod answers_lost;
 mod book;
 mod can_bus;
 mod can_link;

@@ -95,7 +95,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Action::Show => show(&mut client, global),
         Action::Forget => {
             client.forget_calibration().map_err(|error| error.into_failure(DOING))?;
-            show(&mut client, global)
+            show(&mut client, global).inspect_err(|_| global.output().say("the device has forgotten the home"))
         }
         Action::Home(Home { set: Some(home), report, .. }) => {
             let report = CalibrationReport::open(report.as_deref(), &[], &client, global, DOING)?;
@@ -106,7 +106,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             if written.is_err() {
                 global.output().say("the home is stored in the device; its report is not written");
             }
-            written.and_then(|()| show(&mut client, global))
+            let stored = |_: &Failure| global.output().say("the home is stored in the device");
+            written.and_then(|()| show(&mut client, global).inspect_err(stored))
         }
         Action::Home(Home { here: Some(truth), at_home, report, .. }) => {
             let report = CalibrationReport::open(report.as_deref(), &[], &client, global, DOING)?;
@@ -147,7 +148,8 @@ fn store(
             None => failure,
         }
     })?;
-    if client.status().map_err(|error| error.into_failure(DOING))?.zeroed {
+    // The home is kept: what is only told beside it fails nothing.
+    if client.status().is_ok_and(|status| status.zeroed) {
         global.output().say("the arm still counts from its old zero: emergency stop, bring it home, zero it again");
     }
     Ok(())

@@ -151,7 +151,7 @@ pub(super) fn report(
         mode: mode.name(),
         folder: None,
         preconditions: Vec::new(),
-        duration_s: recording.running().len() as f64 / RATE,
+        duration_s: duration(&recording.running()),
         tracking,
         hand_tracking,
         samples: outcome.samples,
@@ -173,6 +173,13 @@ pub(super) fn report(
         telemetry_dropped: statistics.telemetry_dropped,
         bus,
     })
+}
+
+/// Time from the beginning of the first cycle of a run to the end of its last one, s. Cycles that were lost on the line
+/// took theirs all the same.
+fn duration(run: &Recording) -> f64 {
+    let span = run.time.first().zip(run.time.last());
+    span.map_or(0.0, |(first, last)| last - first + 1.0 / RATE)
 }
 
 /// Largest difference between measured and expected force in the run, N.
@@ -239,5 +246,26 @@ impl Report {
             row("bus hash", bus.hash.clone());
         }
         table.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The change that makes it fail: the samples are counted.
+    #[test]
+    fn a_run_takes_its_time_whatever_the_line_loses_of_it() {
+        let told = |is_lost: fn(u32) -> bool| {
+            let rows = (0..900).filter(|cycle| !is_lost(*cycle)).map(|cycle| {
+                let state = if (150..750).contains(&cycle) { "run" } else { "hold" };
+                format!("{cycle},{:.6},{state}\n", f64::from(cycle) / RATE)
+            });
+            let text = "cycle,t_s,state\n".to_owned() + &rows.collect::<String>();
+            duration(&Recording::parse(Path::new("run"), text.as_bytes()).unwrap().running())
+        };
+        for lost in [|_| false, |cycle: u32| cycle.is_multiple_of(5) && cycle != 150] as [fn(u32) -> bool; 2] {
+            assert!((told(lost) - 600.0 / RATE).abs() < 1e-5, "{}", told(lost));
+        }
     }
 }

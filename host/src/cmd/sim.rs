@@ -1,14 +1,11 @@
 //! `tactus sim`: a simulated arm that stays, for other terminals to connect to.
 
 mod bus;
+mod listener;
 mod party;
 mod pendant;
 mod real_time;
 
-use std::io::ErrorKind;
-use std::net::TcpListener;
-use std::os::unix::fs::FileTypeExt;
-use std::os::unix::net::UnixListener;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -24,8 +21,9 @@ use lab::device::Device;
 use lab::error::HostError;
 use lab::quoted;
 use lab::simulation::Engine;
-use lab::transport::{Address, AddressError, Transport, TransportError};
-use party::{Party, Peer};
+use lab::transport::{Address, Transport, TransportError};
+use listener::{Listener, accept, listen};
+use party::Party;
 use pendant::Pendant;
 use real_time::RealTime;
 
@@ -64,30 +62,6 @@ pub struct Cmd {
     /// Leave the co-controller out: the bus has only pucks, safety module, sensor and hand
     #[arg(long, requires = "can", conflicts_with_all = ["listen", "flash"])]
     pub can_only: bool,
-}
-
-enum Listener {
-    Unix(UnixListener, PathBuf),
-    Tcp(TcpListener),
-}
-
-impl Listener {
-    /// The address to name, with the port that the system chose where 0 was asked for.
-    fn address(&self, asked: &str) -> String {
-        match self {
-            Self::Tcp(listener) => listener.local_addr().map_or(asked.to_owned(), |address| format!("tcp:{address}")),
-            Self::Unix(..) => asked.to_owned(),
-        }
-    }
-}
-
-impl Drop for Listener {
-    fn drop(&mut self) {
-        if let Self::Unix(_, path) = self {
-            // Left behind it would only confuse the next one.
-            let _ = std::fs::remove_file(path);
-        }
-    }
 }
 
 /// Serves a simulated arm until it is interrupted.
@@ -152,59 +126,6 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 pub struct Simulated {
     /// Virtual time that has passed, s.
     pub simulated_s: f64,
-}
-
-/// Where an arm can be served.
-const PLACES: &str = "listen on unix:PATH or tcp:HOST:PORT";
-
-fn listen(text: &str) -> Result<Listener, Box<dyn std::error::Error + Send + Sync>> {
-    let address = match text.parse() {
-        Err(AddressError::Kind(_)) => return Err(PLACES.into()),
-        address => address?,
-    };
-    match address {
-        Address::Unix(path) => {
-            let listener = match UnixListener::bind(&path) {
-                // A socket nobody answers on is the left-over of one that was killed. Anything else is somebody's.
-                Err(error)
-                    if error.kind() == ErrorKind::AddrInUse
-                        && std::fs::symlink_metadata(&path)?.file_type().is_socket()
-                        && std::os::unix::net::UnixStream::connect(&path).is_err() =>
-                {
-                    std::fs::remove_file(&path)?;
-                    UnixListener::bind(&path)?
-                }
-                other => other?,
-            };
-            listener.set_nonblocking(true)?;
-            Ok(Listener::Unix(listener, path))
-        }
-        Address::Tcp(address) => {
-            let listener = TcpListener::bind(address)?;
-            listener.set_nonblocking(true)?;
-            Ok(Listener::Tcp(listener))
-        }
-        _ => Err(PLACES.into()),
-    }
-}
-
-fn accept(listener: &Listener) -> std::io::Result<Option<Box<dyn Peer>>> {
-    let accepted: std::io::Result<Box<dyn Peer>> = match listener {
-        Listener::Unix(listener, _) => listener.accept().and_then(|(stream, _)| {
-            stream.set_nonblocking(true)?;
-            Ok(Box::new(stream) as Box<dyn Peer>)
-        }),
-        Listener::Tcp(listener) => listener.accept().and_then(|(stream, _)| {
-            stream.set_nonblocking(true)?;
-            stream.set_nodelay(true)?;
-            Ok(Box::new(stream) as Box<dyn Peer>)
-        }),
-    };
-    match accepted {
-        Ok(peer) => Ok(Some(peer)),
-        Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(None),
-        Err(error) => Err(error),
-    }
 }
 
 fn serve(

@@ -520,7 +520,7 @@ impl<T: Transport> Client<T> {
     pub fn status(&mut self) -> Result<Status, HostError> {
         match self.request(&Request::Status)? {
             Reply::Status { status, .. } => {
-                self.moving &= motion::is_moving(status.state);
+                self.note_status(&status);
                 Ok(status)
             }
             _ => Err(HostError::WrongAnswer { request: "status" }),

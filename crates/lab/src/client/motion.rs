@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use control::State;
-use link::{Goal, Name, Request, RunOptions};
+use link::{Goal, HandStage, Name, Request, RunOptions, Status};
 
 use super::Client;
 use crate::error::HostError;
@@ -13,8 +13,8 @@ use crate::transport::Transport;
 /// after the command; this leaves room for a slow line.
 const STOP_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// Longest time that an initialisation of the hand takes, or a motion of it whose duration the device chooses; behind a
-/// motion of another duration it is more than enough.
+/// Longest time that a motion of the hand takes whose duration the device chooses, or an initialisation after it was
+/// last seen to go on; behind a motion of another duration it is more than enough.
 const HAND_CHOOSES: Duration = Duration::from_secs(10);
 
 impl<T: Transport> Client<T> {
@@ -173,6 +173,15 @@ impl<T: Transport> Client<T> {
             // What is bridged may be a hold as well as a motion.
             Some(State::Coast) => {}
             _ => self.moving &= !self.seen_moving,
+        }
+    }
+
+    /// Notes what a status tells of motions. A hand takes up to ten seconds for its fingers and ten for its spread: an
+    /// initialisation of this host goes on for as long as it is seen to.
+    pub(super) fn note_status(&mut self, status: &Status) {
+        self.moving &= is_moving(status.state);
+        if status.hand_stage == HandStage::Initialising && self.now() < self.hand_moves_until {
+            self.hand_may_move_for(0.0);
         }
     }
 
