@@ -3,8 +3,9 @@
 //! Checked in every tracked or new file. Markdown: links with their anchors, paths and test names in code spans. All
 //! text: paths below `docs/`, numbers of decisions, identifiers of `docs/faults.md`. Rust comments: paths below any
 //! folder of the root. Every document is in the index of the documents, and every test that begins with a fault
-//! identifier is in the entry of that fault.
+//! identifier is in the entry of that fault: its row, or the section that the row leads to.
 
+mod catalogue;
 mod facts;
 mod scan;
 #[cfg(test)]
@@ -20,7 +21,7 @@ use facts::Facts;
 /// Files whose text is not ours or not prose: licences, lock files, and the made-up files of the tests of this check.
 const NOT_READ: [&str; 5] =
     ["LICENSE-", "Cargo.lock", "emulator/Cargo.lock", "docs/images/", "xtask/src/docs/tests.rs"];
-/// The catalogue of faults, whose first column defines the identifiers.
+/// The catalogue of faults, whose rows define the identifiers.
 const CATALOGUE: &str = "docs/faults.md";
 /// The index of the documents.
 const INDEX: &str = "docs/README.md";
@@ -53,6 +54,7 @@ fn check(files: &[(String, String)]) -> Vec<Dead> {
     if facts.faults.is_empty() {
         dead.push(Dead { text: format!("{CATALOGUE} defines no fault identifier") });
     }
+    dead.extend(facts.faults.wrong.iter().map(|(line, why)| Dead { text: format!("{CATALOGUE}:{line}: {why}") }));
     for (path, text) in files {
         let mut fenced = false;
         for (index, line) in text.lines().enumerate() {
@@ -132,15 +134,15 @@ fn anywhere(facts: &Facts, path: &str, line: &str, causes: &mut BTreeSet<String>
     let no_fault = |identifier: &str| format!("{CATALOGUE} has no fault {identifier}");
     if path.ends_with(".md") || comment.is_some() {
         let named = scan::identifiers(comment.unwrap_or(line));
-        causes.extend(named.iter().filter(|name| !facts.faults.contains_key(*name)).map(|name| no_fault(name)));
+        causes.extend(named.iter().filter(|name| !facts.faults.has(name)).map(|name| no_fault(name)));
     }
     // A catalogue that does not know its tests says "open" of what is held.
     let function = scan::name(line).filter(|_| path.ends_with(".rs")).unwrap_or_default();
     for identifier in scan::identifiers_of_name(function) {
-        match facts.faults.get(&identifier) {
-            None => drop(causes.insert(no_fault(&identifier))),
-            Some(entry) if entry.contains(function) => {}
-            Some(_) => drop(causes.insert(format!("{CATALOGUE} does not name {function} under {identifier}"))),
+        if !facts.faults.has(&identifier) {
+            causes.insert(no_fault(&identifier));
+        } else if !facts.faults.names(&identifier, function) {
+            causes.insert(format!("{CATALOGUE} does not name {function} under {identifier}"));
         }
     }
 }

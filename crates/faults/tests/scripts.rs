@@ -59,6 +59,35 @@ fn script_and_catalogue_say_the_same_or_the_difference_is_told() {
 }
 
 #[test]
+fn a_test_of_a_script_stands_in_the_row_or_the_section_of_its_entry() {
+    let entry = read(SCRIPT).expect("sound");
+    let row = "| [A12](#a12) | torque frames cannot leave | counted | Fault | **part**: one case |\n\n";
+    let found = |sections: &str| differences(std::slice::from_ref(&entry), &format!("{row}{sections}"));
+    assert_eq!(found("### A12\n\n- `some_test_of_it`\n"), [""; 0]);
+    for sections in [
+        "### A12\n\n- `some_test_of_it_too`\n",
+        "### A13\n\n- `some_test_of_it`\n\n### A12\n",
+        "### A12\n\n## Storms\n\n`some_test_of_it`\n",
+        "### A12\n\n### A1\n\n`some_test_of_it`\n",
+        "`some_test_of_it`\n\n### A12\n",
+    ] {
+        assert_eq!(found(sections), ["A12: docs/faults.md does not name the test some_test_of_it"], "{sections}");
+    }
+}
+
+#[test]
+fn the_last_cell_of_a_row_is_short() {
+    let entry = read(SCRIPT).expect("sound");
+    let found = |words: usize| {
+        let missing = "word ".repeat(words);
+        let row = format!("| A12 | torque frames cannot leave | counted | Fault | **part**: {missing}|\n\n");
+        differences(std::slice::from_ref(&entry), &format!("{row}### A12\n\n`some_test_of_it`\n"))
+    };
+    assert_eq!(found(25), [""; 0]);
+    assert_eq!(found(26), ["A12: 26 words behind the mark in docs/faults.md, at most 25"]);
+}
+
+#[test]
 fn a_scenario_is_judged_by_its_bars_and_a_known_defect_has_to_fail() {
     let judged = |text: &str| {
         let entry = read(text).expect("sound");

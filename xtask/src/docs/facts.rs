@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::catalogue::Catalogue;
 use super::{CATALOGUE, scan};
 
 /// Everything that exists.
@@ -15,8 +16,8 @@ pub(super) struct Facts {
     pub(super) functions: BTreeSet<String>,
     /// Four digits each.
     pub(super) decisions: BTreeSet<String>,
-    /// Identifiers of the catalogue, each with its entry.
-    pub(super) faults: BTreeMap<String, String>,
+    /// Entries of the catalogue.
+    pub(super) faults: Catalogue,
 }
 
 impl Facts {
@@ -29,7 +30,7 @@ impl Facts {
             anchors: BTreeMap::new(),
             functions: BTreeSet::new(),
             decisions: BTreeSet::new(),
-            faults: BTreeMap::new(),
+            faults: Catalogue::default(),
         };
         for (path, text) in files {
             for (at, _) in path.match_indices('/') {
@@ -47,9 +48,7 @@ impl Facts {
                 facts.anchors.insert(path.clone(), anchors(text));
             }
             if path == CATALOGUE {
-                let entries = text.lines().filter_map(|line| line.strip_prefix("| ")?.split_once(" |"));
-                let entries = entries.filter(|(first, _)| scan::is_identifier(first));
-                facts.faults.extend(entries.map(|(first, rest)| (first.to_owned(), rest.to_owned())));
+                facts.faults = Catalogue::of(text);
             }
         }
         facts

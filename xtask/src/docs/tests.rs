@@ -2,14 +2,34 @@
 
 use super::check;
 
+/// A catalogue with two entries: each a row that leads to a section.
+const CATALOGUE: &str = "# Faults
+
+| id | today |
+|---|---|
+| [A8](#a8) | **held** |
+| [B12](#b12) | **part**: `b12_in_its_row` |
+
+### A8
+
+Two tests:
+
+- `a8_a_stuck_encoder_stops_the_arm`
+- `a8_b12_stop`
+
+### B12
+
+- `a8_b12_stop`, and `b12_in_its_section` of `a8_of_the_other`
+
+## Storms
+
+No entry: `b12_behind_the_entries`.
+";
+
 /// A small repository: a catalogue, a guide, a decision, a package with a test, and the files of the test.
 fn repository(more: &[(&str, String)]) -> Vec<(String, String)> {
     let mut files = vec![
-        (
-            "docs/faults.md".to_owned(),
-            "# Faults\n\n| id |\n| A8 | `a8_a_stuck_encoder_stops_the_arm`, `a8_b12_stop` |\n| B12 | `a8_b12_stop` |\n"
-                .to_owned(),
-        ),
+        ("docs/faults.md".to_owned(), CATALOGUE.to_owned()),
         ("docs/guide.md".to_owned(), "# Guide\n\n## Two words, and `code`\n".to_owned()),
         ("docs/decisions/0007-seven.md".to_owned(), String::new()),
         ("docs/README.md".to_owned(), "[f](faults.md) [g](guide.md) [7](decisions/0007-seven.md) [a](a.md)".to_owned()),
@@ -28,6 +48,14 @@ fn repository(more: &[(&str, String)]) -> Vec<(String, String)> {
 /// Returns the findings in a file with this text.
 fn found(path: &str, text: impl Into<String>) -> Vec<String> {
     check(&repository(&[(path, text.into())])).into_iter().map(|dead| dead.text).collect()
+}
+
+/// Returns the findings in a repository with this catalogue.
+fn in_catalogue(catalogue: &str) -> Vec<String> {
+    let mut files = repository(&[]);
+    files.retain(|(path, _)| path != "docs/faults.md");
+    files.push(("docs/faults.md".to_owned(), catalogue.to_owned()));
+    check(&files).into_iter().map(|dead| dead.text).collect()
 }
 
 /// Passes with `alive`, and fails in its first line, naming `dead`, when that stands in its place.
@@ -86,6 +114,48 @@ fn fault_identifiers_are_those_of_the_catalogue() {
     tells_apart("crates/arm/src/a.rs", "// (faults A8 to B12).", "// (faults A8 to B13).", "no fault B13");
     tells_apart("a.md", "stuck (A8) pin (PD0) E999 (A7.7)", "stuck (A7)", "no fault A7");
     assert_eq!(found("crates/arm/src/a.rs", "let x = f(A9);"), [""; 0], "code is no comment");
+}
+
+#[test]
+fn a_test_is_named_by_the_row_or_the_section_of_its_entry() {
+    let test = |name: &str| found("crates/arm/tests/b.rs", format!("fn {name}() {{}}"));
+    for named in ["a8_b12_stop", "b12_in_its_row", "b12_in_its_section"] {
+        assert_eq!(test(named), [""; 0], "{named}");
+    }
+    for (elsewhere, entry) in [
+        ("a8_of_the_other", "A8"),
+        ("b12_behind_the_entries", "B12"),
+        ("b12_in_its", "B12"),
+        ("a8_a_stuck_encoder_stops", "A8"),
+    ] {
+        let cause = format!("crates/arm/tests/b.rs:1: docs/faults.md does not name {elsewhere} under {entry}");
+        assert_eq!(test(elsewhere), [cause]);
+    }
+}
+
+#[test]
+fn a_name_in_the_section_of_an_entry_is_a_function() {
+    let gone = CATALOGUE.replace("Two tests:", "`a8_a_stuck_encoder_that_is_gone`");
+    assert_eq!(in_catalogue(&gone), ["docs/faults.md:10: no function 'a8_a_stuck_encoder_that_is_gone'"]);
+}
+
+#[test]
+fn every_row_has_one_section_and_every_section_one_row() {
+    let a_row = "| [B12](#b12) | **part**: `b12_in_its_row` |\n";
+    for (from, to, cause) in [
+        (a_row, "", "docs/faults.md:14: the section B12 has no row"),
+        ("### B12", "### B13", "docs/faults.md:6: no heading '#b12' in docs/faults.md"),
+        ("### B12", "### B12 and more", "docs/faults.md:6: the row B12 has no section"),
+        ("## Storms", "### B12", "docs/faults.md:19: the section B12 stands there twice"),
+        (a_row, &a_row.repeat(2), "docs/faults.md:7: the row B12 stands there twice"),
+        ("[B12](#b12)", "B12", "docs/faults.md:6: the row B12 does not lead to '#b12'"),
+        ("(#b12)", "(#a8)", "docs/faults.md:6: the row B12 does not lead to '#b12'"),
+    ] {
+        let causes = in_catalogue(&CATALOGUE.replacen(from, to, 1));
+        assert!(causes.iter().any(|found| found == cause), "{from} to {to}: {causes:?}");
+    }
+    let fenced = CATALOGUE.replace("## Storms", "```\n### C1\n| C2 | row |\n```\n\n## Storms");
+    assert_eq!(in_catalogue(&fenced), [""; 0], "an example is no entry");
 }
 
 #[test]

@@ -57,6 +57,9 @@ impl FaultScript {
                 "scenario {number} has no faults: what befalls the arm there comes from the host"
             )));
         }
+        for (index, injection) in scenario.inject.iter().enumerate() {
+            injection.check().map_err(|cause| failed(format!("fault {} of scenario {number}: {cause}", index + 1)))?;
+        }
         Ok(Self { is_from_power_up: scenario.from == "power-up", injections: scenario.inject })
     }
 
@@ -66,6 +69,46 @@ impl FaultScript {
             plant.inject(&self.injections);
         } else {
             plant.inject_on_torque(self.injections);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A finger's puck, node 11, was taken for the arm's last one, and a time that is no number for the beginning.
+    ///
+    /// The change that makes it fail: a script is used as it is read.
+    #[test]
+    fn a_fault_that_means_nothing_is_refused_with_its_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("script.toml");
+        let read = |fault: &str| {
+            let fine = "{ at = 0.5, what = \"bus-off\" }";
+            let text = format!("[[scenario]]\nname = \"odd\"\nfrom = \"power-up\"\ninject = [{fine}, {{ {fault} }}]\n");
+            std::fs::write(&file, text).unwrap();
+            FaultScript::read(file.to_str().unwrap()).map(|_| ()).map_err(|error| error.to_string())
+        };
+        assert_eq!(read("at = 1, lasts = 0.1, every = 1, times = 3, what.restart.node = 7"), Ok(()));
+        for (fault, words) in [
+            ("at = 1, what.restart.node = 11", "fault 2 of scenario 1: node is 11; it must be from 1 to 7"),
+            ("at = 1, what.temperature = { node = 0, celsius = 80 }", "node is 0"),
+            ("at = nan, what = \"bus-off\"", "at is NaN"),
+            ("at = -1, what = \"bus-off\"", "at is -1"),
+            ("at = 1e300, what = \"bus-off\"", "at is 1"),
+            ("at = 1, lasts = -1, what = \"bus-off\"", "lasts is -1"),
+            ("at = 1, times = 0, what = \"bus-off\"", "times is 0"),
+            ("at = 1, times = 4000000000, what = \"bus-off\"", "times is 4000000000"),
+            ("at = 1, what.drop.share = 2", "share is 2"),
+            ("at = 1, what.drop.from = [77]", "from is 77"),
+            ("at = 1, what.flood = { rate = 0, bytes = 8 }", "rate is 0"),
+            ("at = 1, what.flood = { rate = 100, bytes = 9 }", "bytes is 9"),
+            ("at = 1, what.payload = nan", "payload is NaN"),
+            ("at = 1, what.push.force = [0, inf, 0]", "force is inf"),
+        ] {
+            let refused = read(fault).unwrap_err();
+            assert!(refused.contains(words), "{fault}: {refused}");
         }
     }
 }

@@ -3,6 +3,7 @@
 //! [`FaultKind`] is the one table of them, as scripts spell it (`docs/faults.md`). An [`Injection`] says when; its
 //! times count from the moment at which the plant is given it ([`Plant::inject`](crate::Plant::inject)).
 
+mod check;
 mod engine;
 
 use serde::{Deserialize, Serialize};

@@ -1,0 +1,87 @@
+//! Figures of an injection that mean nothing: a puck that no arm has, a time that never comes.
+
+use std::ops::RangeInclusive;
+
+use super::{FaultKind, Frames, Injection};
+
+/// Longest time of a script, s: eleven days.
+const LONGEST_TIME: f64 = 1e6;
+
+/// Most times that one fault comes.
+const MOST_TIMES: u32 = 100_000;
+
+/// Numbers of the nodes of a bus.
+const NODES: RangeInclusive<u8> = 0..=31;
+
+/// Pucks of the arm.
+const PUCKS: RangeInclusive<u8> = 1..=7;
+
+/// Most frames of a flood in a second: more than any bus carries.
+const MOST_FRAMES: f64 = 1e6;
+
+/// Largest force, torque, mass, friction or drift, in its SI unit.
+const LARGEST: f64 = 1e6;
+
+/// Largest jump of a count.
+const LARGEST_JUMP: f64 = 1e9;
+
+impl Injection {
+    /// Succeeds if the figures mean something.
+    ///
+    /// # Errors
+    /// The first figure that means nothing, and what it may be.
+    pub fn check(&self) -> Result<(), String> {
+        within("at", self.at, 0.0, LONGEST_TIME)?;
+        if self.lasts != f64::INFINITY {
+            within("lasts", self.lasts, 0.0, LONGEST_TIME)?;
+        }
+        within("every", self.every, 0.0, LONGEST_TIME)?;
+        within("times", self.times.into(), 1.0, MOST_TIMES.into())?;
+        match &self.what {
+            FaultKind::Drop(frames)
+            | FaultKind::Repeat(frames)
+            | FaultKind::Flip(frames)
+            | FaultKind::Freeze(frames) => frames.check(),
+            FaultKind::Delay { frames, by } => frames.check().and_then(|()| within("by", *by, 0.0, LONGEST_TIME)),
+            FaultKind::CountJump { node, by } => {
+                one_of("node", *node, &PUCKS)?;
+                within("by", (*by).into(), -LARGEST_JUMP, LARGEST_JUMP)
+            }
+            FaultKind::Restart { node } | FaultKind::Temperature { node, .. } => one_of("node", *node, &PUCKS),
+            FaultKind::Sensor { error, drift } => all("error", error).and_then(|()| all("drift", drift)),
+            FaultKind::Flood { rate, bytes } => {
+                within("rate", *rate, 1e-3, MOST_FRAMES)?;
+                one_of("bytes", *bytes, &(0..=8))
+            }
+            FaultKind::Clock(share) => within("clock", *share, -0.9, 0.9),
+            FaultKind::Push { force } => all("force", force),
+            FaultKind::Payload(mass) => within("payload", *mass, -LARGEST, LARGEST),
+            FaultKind::Friction(added) => all("friction", added),
+            FaultKind::TorqueDelay(by) => within("torque-delay", *by, 0.0, LONGEST_TIME),
+            FaultKind::Pendant(_) | FaultKind::Warning(_) | FaultKind::BusOff | FaultKind::Refuse(_) => Ok(()),
+        }
+    }
+}
+
+impl Frames {
+    fn check(&self) -> Result<(), String> {
+        within("share", self.share, 0.0, 1.0)?;
+        self.from.iter().try_for_each(|node| one_of("from", *node, &NODES))
+    }
+}
+
+fn all(what: &str, values: &[f64]) -> Result<(), String> {
+    values.iter().try_for_each(|value| within(what, *value, -LARGEST, LARGEST))
+}
+
+fn within(what: &str, value: f64, least: f64, most: f64) -> Result<(), String> {
+    if (least..=most).contains(&value) {
+        Ok(())
+    } else {
+        Err(format!("{what} is {value}; it must be from {least} to {most}"))
+    }
+}
+
+fn one_of(what: &str, value: u8, known: &RangeInclusive<u8>) -> Result<(), String> {
+    within(what, value.into(), (*known.start()).into(), (*known.end()).into())
+}
