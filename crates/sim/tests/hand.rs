@@ -529,3 +529,20 @@ fn power_cut_lets_the_worms_hold_and_forgets_the_positions() {
     wake_hand(&mut master);
     assert_ne!(positions(&mut master).0, before);
 }
+
+/// Programs on the simulated bus may set a target that no hand has; the distance to it did not fit, and the simulator
+/// ended.
+///
+/// The change that makes it fail: distances of counts are computed in the width of a count.
+#[test]
+fn a_target_beyond_all_counts_is_a_way_to_go_and_no_end() {
+    let mut master = started();
+    let digit = Node::HAND[0];
+    for property in [Property::Ot, Property::E] {
+        master.set(digit, motor_id(property), i32::MIN);
+    }
+    master.set(digit, PropertyId::POSITION, 5000);
+    master.set(digit, PropertyId::MODE, MotorMode::Trapezoidal.value());
+    master.wait_ms(20);
+    assert_eq!(master.value(digit, PropertyId::MODE), Some(MotorMode::Trapezoidal.value()));
+}

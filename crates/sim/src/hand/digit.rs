@@ -232,7 +232,7 @@ impl Digit {
             }
             MotorMode::Trapezoidal => {
                 let target = self.firmware.value(Property::E);
-                if (self.position(motion.angle) - self.within_travel(target)).abs() <= 1 {
+                if self.distance(target, motion).abs() <= 1 {
                     return self.finish(motion);
                 }
                 self.towards(target, motion, limit)
@@ -323,14 +323,18 @@ impl Digit {
     }
 
     fn towards(&self, target: i32, motion: &Motion, limit: i32) -> Demand {
-        let distance = self.within_travel(target) - self.position(motion.angle);
-        let wanted = POSITION_GAIN * f64::from(distance) / self.counts_per_radian();
+        let wanted = POSITION_GAIN * self.distance(target, motion) as f64 / self.counts_per_radian();
         // MV = 0 means no limit.
         let fastest = match self.firmware.value(Property::Mv) {
             0 => f64::INFINITY,
             limit => self.link_speed(limit).abs(),
         };
         Demand::Velocity(wanted.clamp(-fastest, fastest), self.link_torque(limit))
+    }
+
+    /// Counts to the target, or to the end of the travel before it. Both ends are anybody's to set.
+    fn distance(&self, target: i32, motion: &Motion) -> i64 {
+        i64::from(self.within_travel(target)) - i64::from(self.position(motion.angle))
     }
 
     fn within_travel(&self, target: i32) -> i32 {
