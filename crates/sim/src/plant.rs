@@ -362,9 +362,9 @@ impl Plant {
         self.faults.is_bus_off()
     }
 
-    /// Frames that the co-controller's CAN controller does not take now, because of a fault.
+    /// Frames that the co-controller's CAN controller does not take now, because of faults.
     #[must_use]
-    pub fn refused(&self) -> Option<FrameKind> {
+    pub fn refused(&self) -> Vec<FrameKind> {
         self.faults.refused()
     }
 
@@ -489,17 +489,17 @@ impl Plant {
         while let Some((kind, begins)) = self.faults.change(self.now) {
             let puck = |node: u8| usize::from(node.clamp(1, 7)) - 1;
             match kind {
-                FaultKind::CountJump { node, by } => self.pucks[puck(node)].jump(if begins { by } else { -by }),
-                FaultKind::Restart { node } if begins => {
+                FaultKind::CountJump { node, by } => self.pucks[puck(node)].jump(by, begins),
+                FaultKind::Restart { node } if begins && self.motors.are_powered() => {
                     self.pucks[puck(node)].restart(self.now);
                     self.bus.withdraw(Node::ARM[puck(node)]);
                 }
-                FaultKind::Temperature { node, celsius } => self.pucks[puck(node)].heat(begins.then_some(celsius)),
+                FaultKind::Temperature { node, .. } => self.pucks[puck(node)].heat(self.faults.temperature(node)),
                 FaultKind::Pendant(action) if begins => {
                     self.operator.observe(action);
                     self.safety.press(self.now, action);
                 }
-                FaultKind::Warning(quantity) => self.safety.warn(quantity, begins),
+                FaultKind::Warning(quantity) => self.safety.warn(quantity, self.faults.warns_of(quantity)),
                 FaultKind::Push { .. } | FaultKind::Payload(_) => self.world.push(self.faults.push(), [0.0; 3]),
                 _ => {}
             }
@@ -509,7 +509,7 @@ impl Plant {
             self.bus.queue(self.now, FLOODER, frame);
         }
         while let Some(passage) = self.faults.take_late(self.now) {
-            self.receive(&passage, passage.end);
+            self.receive(&passage, passage.end, 1);
         }
     }
 
@@ -518,18 +518,16 @@ impl Plant {
         if passage.sender == Node::HOST {
             self.deliveries.push_back(Delivery { at: passage.end, received: None });
         }
-        if let Treated::Received(frame, is_repeated) = self.faults.treat(self.now, passage) {
-            self.receive(&Passage { frame, ..*passage }, passage.received_at());
-            if is_repeated && passage.sender != Node::HOST {
-                self.deliveries.push_back(Delivery { at: passage.end, received: Some(frame) });
-            }
+        if let Treated::Received(frame, copies) = self.faults.treat(self.now, passage) {
+            self.receive(&Passage { frame, ..*passage }, passage.received_at(), copies);
         }
     }
 
-    /// Everybody but its sender has a frame, at time `at`.
-    fn receive(&mut self, passage: &Passage, at: Ticks) {
+    /// Everybody but its sender has a frame, at time `at`; the co-controller has so many `copies` of it.
+    fn receive(&mut self, passage: &Passage, at: Ticks, copies: usize) {
         if passage.sender != Node::HOST {
-            self.deliveries.push_back(Delivery { at: passage.end, received: Some(passage.frame) });
+            let delivery = Delivery { at: passage.end, received: Some(passage.frame) };
+            self.deliveries.extend(std::iter::repeat_n(delivery, copies));
         }
         if let Ok(request) = Request::decode(&passage.frame)
             // What a puck says is a request to nobody; the safety module is the only device that gives orders.
@@ -542,8 +540,10 @@ impl Plant {
             {
                 self.faults.see_torque(self.now);
             }
-            if delay > 0 && matches!(request.action, Action::PackedTorques { .. }) {
-                self.late_torques.push_back((at + delay, request));
+            // A torque overtakes none that is under way.
+            let due = self.late_torques.back().map_or(at, |(latest, _)| *latest).max(at + delay);
+            if due > at && matches!(request.action, Action::PackedTorques { .. }) {
+                self.late_torques.push_back((due, request));
             } else {
                 self.instruct(at, &request);
             }

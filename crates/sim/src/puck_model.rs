@@ -64,6 +64,10 @@ const TEMPERATURES: (i32, i32) = (34, 31);
 pub(crate) struct Puck {
     firmware: Firmware,
     offset: i64,
+    /// Counts by which the position is off, of each fault: gone where the counts begin anew or are set.
+    jumps: Vec<i32>,
+    /// Temperature that it tells because of a fault, degree Celsius.
+    heated: Option<i32>,
     /// T as the master set it; what acts is clipped to MT.
     commanded: i32,
 }
@@ -97,7 +101,7 @@ impl Puck {
             (Property::Ecmin, 0),
         ];
         let firmware = Firmware::new(node, config.monitor_version, &factory, noise)?;
-        Ok(Self { firmware, offset: 0, commanded: 0 })
+        Ok(Self { firmware, offset: 0, jumps: Vec::new(), heated: None, commanded: 0 })
     }
 
     /// Motor power comes.
@@ -122,15 +126,18 @@ impl Puck {
         self.power_on(now);
     }
 
-    /// The position is off by so many counts from now on.
-    pub(crate) fn jump(&mut self, counts: i32) {
-        self.offset += i64::from(counts);
+    /// The position is off by so many counts from now on, or no longer.
+    pub(crate) fn jump(&mut self, counts: i32, begins: bool) {
+        if begins {
+            self.jumps.push(counts);
+        } else if let Some(place) = self.jumps.iter().position(|jump| *jump == counts) {
+            self.jumps.remove(place);
+        }
     }
 
-    /// Puck and motor are this hot, degree Celsius; `None`: as usual.
+    /// Puck and motor are this hot, degree Celsius, over a restart as well; `None`: as usual.
     pub(crate) fn heat(&mut self, celsius: Option<i32>) {
-        self.firmware.store(Property::Temp, celsius.unwrap_or(TEMPERATURES.0));
-        self.firmware.store(Property::Therm, celsius.unwrap_or(TEMPERATURES.1));
+        self.heated = celsius;
     }
 
     /// A request on the bus at time `at`; packed torques act at once, the rest waits its turn.
@@ -157,6 +164,10 @@ impl Puck {
                 let within = self.encoder(angle).rem_euclid(self.counts_per_revolution());
                 Some(self.firmware.reply(Property::Mech, id, within as i32))
             }
+            Order::Get { property: property @ (Property::Temp | Property::Therm), id } => match self.heated {
+                Some(celsius) => Some(self.firmware.reply(property, id, celsius)),
+                None => self.firmware.answer(property, id),
+            },
             Order::Get { property, id } => self.firmware.answer(property, id),
             Order::Set { property, value } => {
                 self.set(property, value, angle);
@@ -187,7 +198,10 @@ impl Puck {
 
     fn set(&mut self, property: Property, value: i32, angle: f64) {
         match property {
-            Property::P => self.offset = i64::from(value) - self.encoder(angle),
+            Property::P => {
+                self.offset = i64::from(value) - self.encoder(angle);
+                self.jumps.clear();
+            }
             Property::T => self.command(value),
             Property::Mode => {
                 self.commanded = 0;
@@ -204,6 +218,7 @@ impl Puck {
 
     fn forget(&mut self) {
         self.offset = 0;
+        self.jumps.clear();
         self.commanded = 0;
     }
 
@@ -218,6 +233,7 @@ impl Puck {
 
     fn position(&self, angle: f64) -> Counts {
         // The cast keeps the low 32 bits, of which the frame takes 22: the position wraps as on the puck.
-        Counts((self.encoder(angle) + self.offset) as i32)
+        let jumped: i64 = self.jumps.iter().map(|jump| i64::from(*jump)).sum();
+        Counts((self.encoder(angle) + self.offset + jumped) as i32)
     }
 }

@@ -157,7 +157,8 @@ impl SafetyModule {
 
     /// Warns of a quantity from now on, or no longer.
     pub(crate) fn warn(&mut self, quantity: Supervised, is_on: bool) {
-        if is_on { self.warned.push(quantity) } else { self.warned.retain(|other| *other != quantity) }
+        self.warned.retain(|other| *other != quantity);
+        self.warned.extend(is_on.then_some(quantity));
     }
 
     /// The operator acts at the pendant.

@@ -122,3 +122,118 @@ fn equal_seeds_lose_equal_frames() {
     let count: usize = one.iter().map(Vec::len).sum();
     assert!((20..70).contains(&count), "{count} of 140 at a share of 0.3");
 }
+
+/// An arm under torque mode that nobody asks anything of, with these faults from now on.
+fn active_and_befallen(injections: &[Injection]) -> Master {
+    let mut master =
+        Master::new(PlantConfig { started: true, operator: OperatorConfig::prompt(), ..PlantConfig::default() });
+    master.poll(100);
+    assert_eq!(master.plant.safety_mode(), puck::SafetyMode::Active);
+    assert!(master.plant.is_free(), "torque mode, zero torque");
+    master.plant.inject(injections);
+    master.heard.clear();
+    master
+}
+
+fn ever(what: FaultKind) -> Injection {
+    Injection { at: 0.0, lasts: f64::INFINITY, every: 0.0, times: 1, what }
+}
+
+/// A puck that was restarted behind an emergency stop answered, on an arm whose pucks have no power.
+///
+/// The change that makes it fail: a restart gives a puck its power whether or not there is any.
+#[test]
+fn a_puck_restarts_only_where_there_is_power() {
+    let mut master = befallen(FaultKind::Restart { node: 4 }, 0.01, f64::INFINITY);
+    master.plant.press(PendantAction::PressEStop);
+    master.wait_ms(50);
+    assert_eq!(master.value(Node::ARM[3], PropertyId::STAT), None);
+}
+
+/// The change that makes it fail: the end of one fault puts back what another of its kind still says, or a restart does.
+#[test]
+fn a_temperature_and_a_warning_end_with_the_last_of_their_kind_and_not_with_a_restart() {
+    let at = |at, lasts, what| Injection { at, lasts, ..ever(what) };
+    let hot = |celsius| FaultKind::Temperature { node: 4, celsius };
+    let warning = || FaultKind::Warning(sim::fault::Supervised::Torque);
+    let mut master = befallen(hot(80), 0.0, 0.03);
+    master.plant.inject(&[at(0.01, 0.01, hot(90)), at(0.0, 0.03, warning()), at(0.01, 0.01, warning())]);
+    let mut told = Vec::new();
+    for _ in 0..4 {
+        told.push((
+            master.motor_value(Node::ARM[3], Property::Temp),
+            master.plant.pendant().torque == puck::safety::Health::Warning,
+        ));
+        master.wait_ms(8);
+    }
+    assert_eq!(told, [(Some(80), true), (Some(90), true), (Some(80), true), (Some(34), false)]);
+    master.plant.inject(&[ever(hot(70)), at(0.01, f64::INFINITY, FaultKind::Restart { node: 4 })]);
+    master.wait_ms(50);
+    master.set(Node::ARM[3], PropertyId::STAT, 2);
+    master.wait_ms(1100);
+    assert_eq!(master.motor_value(Node::ARM[3], Property::Therm), Some(70), "it is as hot as before");
+}
+
+/// The change that makes it fail: the end of a jump takes from counts that have begun anew, or were set, since.
+#[test]
+fn a_jump_of_counts_that_begin_anew_has_no_end() {
+    let mut master = befallen(FaultKind::CountJump { node: 4, by: 5000 }, 0.01, 0.02);
+    master.wait_ms(15);
+    master.set(Node::ARM[3], PropertyId::POSITION, 100);
+    let counts = |master: &mut Master| master.positions()[3].expect("awake").0;
+    assert!((counts(&mut master) - 100).abs() < 50);
+    master.wait_ms(20);
+    assert!((counts(&mut master) - 100).abs() < 200, "right before, right now");
+}
+
+/// The change that makes it fail: `most` is not for a freeze.
+#[test]
+fn a_freeze_holds_for_no_more_frames_than_ordered() {
+    let mut master = befallen(FaultKind::Freeze(Frames { most: 2, ..positions_of(4) }), 0.0, f64::INFINITY);
+    let counts = |master: &mut Master| master.positions()[3].expect("awake").0;
+    let first = counts(&mut master);
+    master.set(Node::ARM[3], PropertyId::POSITION, first + 5000);
+    assert_eq!(counts(&mut master), first);
+    assert!((counts(&mut master) - first - 5000).abs() < 200, "the third one is true");
+}
+
+/// The change that makes it fail: of several faults of a kind only the first is there, or their sum turns time back.
+#[test]
+fn faults_of_one_kind_at_the_same_time_are_all_there() {
+    let mut master = befallen(FaultKind::Refuse(FrameKind::ArmTorques), 0.0, f64::INFINITY);
+    master.plant.inject(&[ever(FaultKind::Refuse(FrameKind::WristTorques))]);
+    master.wait_ms(1);
+    let refused = master.plant.refused();
+    assert_eq!(refused, [FrameKind::ArmTorques, FrameKind::WristTorques]);
+    master.plant.inject(&[ever(FaultKind::Clock(-0.6)), ever(FaultKind::Clock(-0.6))]);
+    master.wait_ms(1);
+    assert_eq!(master.plant.clock_error(), -0.9, "a clock that stands still ends no slot");
+}
+
+/// The change that makes it fail: a frame that is late comes as it was before another fault changed it.
+#[test]
+fn a_frame_that_is_changed_and_late_is_late_and_changed() {
+    let mut master = befallen(FaultKind::Freeze(positions_of(4)), 0.0, f64::INFINITY);
+    let first = master.positions()[3].expect("awake").0;
+    master.set(Node::ARM[3], PropertyId::POSITION, first + 5000);
+    master.plant.inject(&[ever(FaultKind::Delay { frames: positions_of(4), by: 0.003 })]);
+    assert_eq!(missing(&master.positions()), [3]);
+    master.wait_ms(3);
+    let (_, late) = master.heard.last().expect("it comes");
+    let frozen = puck::device::position_frame(Node::ARM[3], Counts(first), None);
+    assert_eq!(*late, frozen);
+}
+
+/// The change that makes it fail: a torque that is sent when the delay is over overtakes those that are under way.
+#[test]
+fn torques_stay_in_order_when_their_delay_ends() {
+    let mut master = active_and_befallen(&[Injection { lasts: 0.01, ..ever(FaultKind::TorqueDelay(0.02)) }]);
+    let torque = |units| puck::PuckTorque::new(units).expect("14 bits");
+    let all = |units| puck::packed_torques(puck::Group::ARM_TORQUES, PropertyId::TORQUE, [torque(units); 4]);
+    master.wait_ms(8);
+    master.send(all(50));
+    master.wait_ms(4);
+    master.send(all(0));
+    master.wait_ms(30);
+    assert!(master.plant.is_free(), "the last word is zero");
+}

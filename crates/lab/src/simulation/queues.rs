@@ -39,7 +39,7 @@ pub(crate) struct Queues {
     /// Frames for the bus.
     pub(crate) transmitted: Vec<CanFrame>,
     /// Frames that the CAN controller does not take now.
-    pub(crate) refused: Option<FrameKind>,
+    pub(crate) refused: Vec<FrameKind>,
     /// Frames that wait for the bus since earlier slots.
     pub(crate) waiting: usize,
     commands: VecDeque<Command>,
@@ -54,7 +54,7 @@ impl ControllerIo<DeviceController> for Queues {
 
     fn transmit(&mut self, frame: CanFrame) -> bool {
         let has_room = self.waiting + self.transmitted.len() < OUTGOING;
-        let is_taken = has_room && self.refused.is_none_or(|kind| !kind.fits(&frame));
+        let is_taken = has_room && !self.refused.iter().any(|kind| kind.fits(&frame));
         self.transmitted.extend(is_taken.then_some(frame));
         is_taken
     }

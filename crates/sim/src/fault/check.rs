@@ -22,6 +22,9 @@ const MOST_FRAMES: f64 = 1e6;
 /// Largest force, torque, mass, friction or drift, in its SI unit.
 const LARGEST: f64 = 1e6;
 
+/// Largest share by which a clock is slow or fast, of all its faults together: time goes on.
+pub(super) const LARGEST_CLOCK_ERROR: f64 = 0.9;
+
 /// Largest jump of a count.
 const LARGEST_JUMP: f64 = 1e9;
 
@@ -53,7 +56,7 @@ impl Injection {
                 within("rate", *rate, 1e-3, MOST_FRAMES)?;
                 one_of("bytes", *bytes, &(0..=8))
             }
-            FaultKind::Clock(share) => within("clock", *share, -0.9, 0.9),
+            FaultKind::Clock(share) => within("clock", *share, -LARGEST_CLOCK_ERROR, LARGEST_CLOCK_ERROR),
             FaultKind::Push { force } => all("force", force),
             FaultKind::Payload(mass) => within("payload", *mass, -LARGEST, LARGEST),
             FaultKind::Friction(added) => all("friction", added),

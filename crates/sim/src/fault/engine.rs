@@ -1,6 +1,7 @@
 //! Carries out injections: which faults are there now, and their effect on a frame.
 
-use super::{FaultKind, FrameKind, Frames, Injection};
+use super::check::LARGEST_CLOCK_ERROR;
+use super::{FaultKind, FrameKind, Frames, Injection, Supervised};
 use crate::noise::Noise;
 use crate::time::{Ticks, seconds, ticks};
 use crate::wire::Passage;
@@ -59,8 +60,8 @@ pub(crate) enum Treated {
     Lost,
     /// It comes by itself, later.
     Later,
-    /// It is received as it is now; true if the co-controller receives it twice.
-    Received(CanFrame, bool),
+    /// It is received as it is now; the co-controller receives so many copies.
+    Received(CanFrame, usize),
 }
 
 /// Everything ordered.
@@ -161,12 +162,13 @@ impl Faults {
     /// Share by which the co-controller's clock is slow.
     pub(crate) fn clock_error(&self) -> f64 {
         let errors = self.present().map(|order| if let FaultKind::Clock(share) = order.kind { share } else { 0.0 });
-        errors.sum()
+        // Each is within the same bounds.
+        errors.sum::<f64>().clamp(-LARGEST_CLOCK_ERROR, LARGEST_CLOCK_ERROR)
     }
 
     /// Fate of a frame that has just left the wire.
     pub(crate) fn treat(&mut self, now: Ticks, passage: &Passage) -> Treated {
-        let (mut frame, mut is_repeated) = (passage.frame, false);
+        let (mut frame, mut copies) = (passage.frame, 1);
         for order in self.orders.iter_mut().filter(|order| order.phase == Phase::During) {
             match &order.kind {
                 FaultKind::BusOff => return Treated::Lost,
@@ -180,18 +182,19 @@ impl Faults {
                     order.hits += 1;
                     let at = now + ticks(*by);
                     let place = self.late.partition_point(|(other, _)| *other <= at);
-                    self.late.insert(place, (at, Passage { end: at, ..*passage }));
+                    self.late.insert(place, (at, Passage { end: at, frame, ..*passage }));
                     return Treated::Later;
                 }
                 FaultKind::Repeat(frames) if order.hits < frames.most && frames.mean(passage, &mut self.noise) => {
                     order.hits += 1;
-                    is_repeated = true;
+                    copies = 2 * copies.min(1);
                 }
                 FaultKind::Flip(frames) if order.hits < frames.most && frames.mean(passage, &mut self.noise) => {
                     order.hits += 1;
                     frame = flipped(&frame, &mut self.noise);
                 }
-                FaultKind::Freeze(frames) if frames.mean(passage, &mut self.noise) => {
+                FaultKind::Freeze(frames) if order.hits < frames.most && frames.mean(passage, &mut self.noise) => {
+                    order.hits += 1;
                     match order.first.iter().find(|first| first.can_id() == frame.can_id()) {
                         Some(first) => frame = *first,
                         None => order.first.push(frame),
@@ -200,7 +203,7 @@ impl Faults {
                 _ => {}
             }
         }
-        Treated::Received(frame, is_repeated)
+        Treated::Received(frame, copies)
     }
 
     /// Error of the sensor at `now`, N and N m, sensor axes.
@@ -252,12 +255,27 @@ impl Faults {
     }
 
     /// Frames that the co-controller's CAN controller does not take.
-    pub(crate) fn refused(&self) -> Option<FrameKind> {
-        self.present().find_map(|order| match order.kind {
+    pub(crate) fn refused(&self) -> Vec<FrameKind> {
+        let kinds = self.present().filter_map(|order| match order.kind {
             FaultKind::Refuse(kind) => Some(kind),
             FaultKind::BusOff => Some(FrameKind::Any),
             _ => None,
-        })
+        });
+        kinds.collect()
+    }
+
+    /// Temperature that a puck tells, degree Celsius, by the last order of those that are present.
+    pub(crate) fn temperature(&self, of: u8) -> Option<i32> {
+        let told = self.present().filter_map(|order| match order.kind {
+            FaultKind::Temperature { node, celsius } if node == of => Some(celsius),
+            _ => None,
+        });
+        told.last()
+    }
+
+    /// True while the pendant warns of a quantity whatever the safety module hears.
+    pub(crate) fn warns_of(&self, quantity: Supervised) -> bool {
+        self.present().any(|order| order.kind == FaultKind::Warning(quantity))
     }
 
     fn present(&self) -> impl Iterator<Item = &Order> {
