@@ -509,7 +509,7 @@ impl Plant {
             self.bus.queue(self.now, FLOODER, frame);
         }
         while let Some(passage) = self.faults.take_late(self.now) {
-            self.receive(&passage, passage.end, 1);
+            self.receive(&passage, passage.end, usize::from(!self.faults.is_bus_off()));
         }
     }
 

@@ -139,6 +139,26 @@ fn ever(what: FaultKind) -> Injection {
     Injection { at: 0.0, lasts: f64::INFINITY, every: 0.0, times: 1, what }
 }
 
+/// The safety module went to IDLE by itself, but its word to the pucks was lost as well: the motors went on pulling, in
+/// a state that no arm has.
+///
+/// The change that makes it fail: a frame of anybody is lost while the co-controller is off the bus.
+#[test]
+fn a10_the_safety_module_brakes_the_motors_while_the_co_controller_is_off_the_bus() {
+    let late = FaultKind::Delay { frames: Frames { most: 1, ..positions_of(4) }, by: 0.01 };
+    let mut master = active_and_befallen(&[ever(late), Injection { at: 0.005, ..ever(FaultKind::BusOff) }]);
+    master.send(puck::get(puck::Group::ARM, PropertyId::POSITION));
+    master.wait_ms(4);
+    assert_eq!(master.heard.len(), 6, "one is late, and comes when nobody is there");
+    master.wait_ms(120);
+    assert_eq!(master.plant.safety_mode(), puck::SafetyMode::Idle);
+    assert!(!master.plant.is_free(), "the pucks have heard it");
+    master.send(puck::set(puck::Group::ARM, PropertyId::MODE, 2));
+    master.wait_ms(10);
+    assert!(!master.plant.is_free(), "nobody hears the co-controller");
+    assert_eq!(master.heard.len(), 6, "nor does it hear anybody");
+}
+
 /// A puck that was restarted behind an emergency stop answered, on an arm whose pucks have no power.
 ///
 /// The change that makes it fail: a restart gives a puck its power whether or not there is any.

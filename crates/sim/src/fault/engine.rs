@@ -171,7 +171,8 @@ impl Faults {
         let (mut frame, mut copies) = (passage.frame, 1);
         for order in self.orders.iter_mut().filter(|order| order.phase == Phase::During) {
             match &order.kind {
-                FaultKind::BusOff => return Treated::Lost,
+                FaultKind::BusOff if passage.sender == Node::HOST => return Treated::Lost,
+                FaultKind::BusOff => copies = 0,
                 FaultKind::Drop(frames) if order.hits < frames.most && frames.mean(passage, &mut self.noise) => {
                     order.hits += 1;
                     return Treated::Lost;

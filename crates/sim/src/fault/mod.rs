@@ -84,7 +84,7 @@ pub enum FaultKind {
         drift: [f64; 6],
     },
     /// The CAN controller of the co-controller has left the bus: it sends and hears nothing, and comes back by itself
-    /// at the end. Engines other than `sil:` are not told.
+    /// at the end. All others go on hearing each other. Engines other than `sil:` are not told.
     BusOff,
     /// The CAN controller of the co-controller takes no such frames. `sil:` only.
     Refuse(FrameKind),
