@@ -91,8 +91,7 @@ impl Scenario {
     /// True if a fault of it lies in the co-controller's own bus controller, which images have from their emulator.
     #[must_use]
     pub fn is_of_the_port(&self) -> bool {
-        let is = |kind: &FaultKind| matches!(kind, FaultKind::BusOff | FaultKind::Refuse(_) | FaultKind::Clock(_));
-        self.inject.iter().any(|injection| is(&injection.what))
+        self.inject.iter().any(|injection| injection.what.is_of_the_port())
     }
 
     /// The scenario up to 0.12 s later, its pushes up to 7 % harder or weaker: a bar that holds at the written
@@ -334,6 +333,9 @@ impl Entry {
             let unknown_fault = faults.iter().find(|name| Fault::ALL.iter().all(|fault| fault_name(*fault) != **name));
             if let Some(name) = unknown_state.or(unknown_fault) {
                 return Err(format!("{}: no state or fault '{name}'", scenario.name));
+            }
+            for (index, injection) in scenario.inject.iter().chain(&scenario.late).enumerate() {
+                injection.check().map_err(|cause| format!("{}: fault {}: {cause}", scenario.name, index + 1))?;
             }
             if scenario.sweep.is_some_and(|sweep| sweep.count == 0 || sweep.by.is_nan() || sweep.by <= 0.0) {
                 return Err(format!("{}: a sweep of no arms, or of no time", scenario.name));

@@ -45,6 +45,19 @@ fn a_word_that_means_nothing_is_refused_with_its_line() {
     assert!(refused("BusFault", "BusFailure").contains("no state or fault 'BusFailure'"));
 }
 
+/// `tactus` refused such a fault, and `cargo xtask faults` took a finger's puck for the arm's last one.
+///
+/// The change that makes it fail: the figures of the faults are not looked at.
+#[test]
+fn a_fault_that_means_nothing_is_refused_with_its_scenario() {
+    let refused = |to: &str| read(&SCRIPT.replace("what.refuse = \"torques\"", to)).expect_err("it means nothing");
+    let words = "for ever: fault 1: node is 11; it must be from 1 to 7";
+    assert!(refused("what.restart.node = 11").contains(words), "{}", refused("what.restart.node = 11"));
+    assert!(refused("times = 3, what = \"bus-off\"").contains("every is 0"));
+    let late = SCRIPT.replace("recover = \"none\"", "late = [{ at = 1, what.restart.node = 0 }]");
+    assert!(read(&late).expect_err("no such puck").contains("node is 0"));
+}
+
 #[test]
 fn script_and_catalogue_say_the_same_or_the_difference_is_told() {
     let entry = read(SCRIPT).expect("sound");

@@ -35,17 +35,30 @@ struct File {
 
 #[derive(Deserialize)]
 struct Scenario {
-    from: String,
+    from: From,
     #[serde(default)]
     inject: Vec<Injection>,
 }
 
+/// States in which a scenario begins, as `crates/faults` has them.
+#[derive(PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum From {
+    PowerUp,
+    Gravity,
+    Hold,
+    Approach,
+    Run,
+    Lowering,
+}
+
 impl FaultScript {
-    /// Reads `FILE` or `FILE:NUMBER`.
+    /// Reads `FILE` or `FILE:NUMBER`, for a device `is_in_process` or emulated.
     ///
     /// # Errors
-    /// [`SimulationError::Faults`] with the line, if the file has no such scenario or one of its faults means nothing.
-    pub(super) fn read(name: &str) -> Result<Self, SimulationError> {
+    /// [`SimulationError::Faults`] with the line, if the file has no such scenario, one of its faults means nothing or
+    /// the device cannot have it.
+    pub(super) fn read(name: &str, is_in_process: bool) -> Result<Self, SimulationError> {
         let (path, number) = scenario(name);
         let failed = |cause: String| SimulationError::Faults(path.to_owned(), cause);
         let text = input_file::read_text(path).map_err(|cause| failed(cause.to_string()))?;
@@ -58,9 +71,13 @@ impl FaultScript {
             )));
         }
         for (index, injection) in scenario.inject.iter().enumerate() {
-            injection.check().map_err(|cause| failed(format!("fault {} of scenario {number}: {cause}", index + 1)))?;
+            let sense = injection.check().and_then(|()| match injection.what.is_of_the_port() && !is_in_process {
+                true => Err("only `sil:` can have it: other devices have a bus controller of their own".to_owned()),
+                false => Ok(()),
+            });
+            sense.map_err(|cause| failed(format!("fault {} of scenario {number}: {cause}", index + 1)))?;
         }
-        Ok(Self { is_from_power_up: scenario.from == "power-up", injections: scenario.inject })
+        Ok(Self { is_from_power_up: scenario.from == From::PowerUp, injections: scenario.inject })
     }
 
     /// Orders the faults.
@@ -88,7 +105,7 @@ mod tests {
             let fine = "{ at = 0.5, what = \"bus-off\" }";
             let text = format!("[[scenario]]\nname = \"odd\"\nfrom = \"power-up\"\ninject = [{fine}, {{ {fault} }}]\n");
             std::fs::write(&file, text).unwrap();
-            FaultScript::read(file.to_str().unwrap()).map(|_| ()).map_err(|error| error.to_string())
+            FaultScript::read(file.to_str().unwrap(), true).map(|_| ()).map_err(|error| error.to_string())
         };
         assert_eq!(read("at = 1, lasts = 0.1, every = 1, times = 3, what.restart.node = 7"), Ok(()));
         for (fault, words) in [
@@ -106,9 +123,39 @@ mod tests {
             ("at = 1, what.flood = { rate = 100, bytes = 9 }", "bytes is 9"),
             ("at = 1, what.payload = nan", "payload is NaN"),
             ("at = 1, what.push.force = [0, inf, 0]", "force is inf"),
+            ("at = 1, lasts = 0, what = \"bus-off\"", "lasts is 0"),
+            ("at = 1, times = 3, what = \"bus-off\"", "every is 0"),
+            ("at = 1, every = 1, what = \"bus-off\"", "times is 1"),
+            ("at = 1, what.drop.most = 0", "most is 0"),
+            ("at = 1, what.temperature = { node = 1, celsius = 40000 }", "celsius is 40000"),
         ] {
             let refused = read(fault).unwrap_err();
             assert!(refused.contains(words), "{fault}: {refused}");
+        }
+    }
+
+    /// A word that names no state was taken for one: the faults came with the first torque. And an emulated controller
+    /// was asked for faults that only the one in this process has, which then did not come.
+    ///
+    /// The change that makes it fail: a state is any text, or every device takes every fault.
+    #[test]
+    fn h15_a_script_that_the_device_cannot_carry_out_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("script.toml");
+        let read = |from: &str, fault: &str, is_in_process: bool| {
+            let text =
+                format!("[[scenario]]\nname = \"odd\"\nfrom = \"{from}\"\ninject = [{{ at = 1, what{fault} }}]\n");
+            std::fs::write(&file, text).unwrap();
+            FaultScript::read(file.to_str().unwrap(), is_in_process).map(|_| ()).map_err(|error| error.to_string())
+        };
+        assert!(read("powerup", " = \"bus-off\"", true).unwrap_err().contains("`powerup`"));
+        for from in ["power-up", "gravity", "hold", "approach", "run", "lowering"] {
+            assert_eq!(read(from, ".restart.node = 1", false), Ok(()), "{from}");
+        }
+        for fault in [" = \"bus-off\"", ".refuse = \"any\"", ".clock = 0.1"] {
+            assert_eq!(read("run", fault, true), Ok(()), "{fault}");
+            let refused = read("run", fault, false).unwrap_err();
+            assert!(refused.contains("fault 1 of scenario 1: only `sil:` can have it"), "{refused}");
         }
     }
 }

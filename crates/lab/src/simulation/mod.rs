@@ -73,7 +73,7 @@ impl Simulation {
         let world = options.build_world()?;
         let mut plant = Plant::new(PlantConfig { seed: options.seed, ..options.plant.clone() }, world);
         if let Some(name) = &options.faults {
-            FaultScript::read(name)?.order(&mut plant);
+            FaultScript::read(name, matches!(options.engine, Engine::InProcess))?.order(&mut plant);
         }
         if options.bus_log.is_some() {
             plant.record_bus();

@@ -4,6 +4,9 @@ use std::ops::RangeInclusive;
 
 use super::{FaultKind, Frames, Injection};
 
+/// Shortest time that a fault lasts or that lies between two, s: below it there is no frame.
+const SHORTEST_TIME: f64 = 1e-6;
+
 /// Longest time of a script, s: eleven days.
 const LONGEST_TIME: f64 = 1e6;
 
@@ -35,11 +38,17 @@ impl Injection {
     /// The first figure that means nothing, and what it may be.
     pub fn check(&self) -> Result<(), String> {
         within("at", self.at, 0.0, LONGEST_TIME)?;
+        let is_of_a_moment = matches!(self.what, FaultKind::Restart { .. } | FaultKind::Pendant(_));
         if self.lasts != f64::INFINITY {
-            within("lasts", self.lasts, 0.0, LONGEST_TIME)?;
+            within("lasts", self.lasts, if is_of_a_moment { 0.0 } else { SHORTEST_TIME }, LONGEST_TIME)?;
         }
-        within("every", self.every, 0.0, LONGEST_TIME)?;
         within("times", self.times.into(), 1.0, MOST_TIMES.into())?;
+        // One of them alone is a fault that comes once, or several times at once.
+        if self.times > 1 {
+            within("every", self.every, SHORTEST_TIME, LONGEST_TIME)?;
+        } else if self.every != 0.0 {
+            within("times", self.times.into(), 2.0, MOST_TIMES.into())?;
+        }
         match &self.what {
             FaultKind::Drop(frames)
             | FaultKind::Repeat(frames)
@@ -50,7 +59,11 @@ impl Injection {
                 one_of("node", *node, &PUCKS)?;
                 within("by", (*by).into(), -LARGEST_JUMP, LARGEST_JUMP)
             }
-            FaultKind::Restart { node } | FaultKind::Temperature { node, .. } => one_of("node", *node, &PUCKS),
+            FaultKind::Restart { node } => one_of("node", *node, &PUCKS),
+            FaultKind::Temperature { node, celsius } => {
+                one_of("node", *node, &PUCKS)?;
+                within("celsius", (*celsius).into(), i16::MIN.into(), i16::MAX.into())
+            }
             FaultKind::Sensor { error, drift } => all("error", error).and_then(|()| all("drift", drift)),
             FaultKind::Flood { rate, bytes } => {
                 within("rate", *rate, 1e-3, MOST_FRAMES)?;
@@ -69,6 +82,7 @@ impl Injection {
 impl Frames {
     fn check(&self) -> Result<(), String> {
         within("share", self.share, 0.0, 1.0)?;
+        within("most", self.most.into(), 1.0, u32::MAX.into())?;
         self.from.iter().try_for_each(|node| one_of("from", *node, &NODES))
     }
 }

@@ -111,6 +111,14 @@ pub enum FaultKind {
     TorqueDelay(f64),
 }
 
+impl FaultKind {
+    /// True if the fault lies in the co-controller's own port, which an emulated device has from its emulator.
+    #[must_use]
+    pub fn is_of_the_port(&self) -> bool {
+        matches!(self, Self::BusOff | Self::Refuse(_) | Self::Clock(_))
+    }
+}
+
 /// Frames on the arm's bus. Without any key: all of them.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
