@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use puck::{Action, CanFrame, Destination, Group, Node, PropertyId, Reply, Request};
+use puck::{Action, CanFrame, Destination, Group, Node, Property, PropertyId, Reply, Request};
 use schemars::JsonSchema;
 use serde::Serialize;
 use sim::wire::frame_bits;
@@ -28,6 +28,7 @@ const BITS_PER_MICROSECOND: f64 = 1.0;
 enum Answer {
     Property(u8),
     Position,
+    SecondaryPosition,
     Force,
     Torque,
     Acceleration,
@@ -90,7 +91,7 @@ impl InterfaceTotals {
         self.window.1 += bits;
         self.busiest_bits = self.busiest_bits.max(self.window.1);
         if let (AnyFrame::Data(frame), false) = (&line.frame, meaning.kind == Kind::Link) {
-            self.follow(line.time_us, frame);
+            self.follow(line.time_us, frame, meaning.property);
         }
     }
 
@@ -99,8 +100,8 @@ impl InterfaceTotals {
         self.cycle.last_us = None;
     }
 
-    /// Questions and answers.
-    fn follow(&mut self, now_us: u64, frame: &CanFrame) {
+    /// Questions and answers. The number of a property depends on the firmware, its `name` does not.
+    fn follow(&mut self, now_us: u64, frame: &CanFrame, name: Option<&str>) {
         if frame.can_id().sender() != Node::HOST {
             if let Some((node, answer)) = Reply::decode(frame).ok().and_then(|reply| answer_of(&reply)) {
                 self.nodes.entry(node.number()).or_default().answer(now_us, answer);
@@ -119,16 +120,16 @@ impl InterfaceTotals {
             self.cycle.begin(now_us);
         }
         match to {
-            Destination::Node(node) => self.ask(now_us, node, property),
+            Destination::Node(node) => self.ask(now_us, node, property, name),
             Destination::Group(group) => {
-                names::members(group).iter().for_each(|node| self.ask(now_us, *node, property));
+                names::members(group).iter().for_each(|node| self.ask(now_us, *node, property, name));
             }
         }
     }
 
-    fn ask(&mut self, now_us: u64, node: Node, property: PropertyId) {
+    fn ask(&mut self, now_us: u64, node: Node, property: PropertyId, name: Option<&str>) {
         let totals = self.nodes.entry(node.number()).or_default();
-        for answer in answers_to(node, property).into_iter().flatten() {
+        for answer in answers_to(node, property, name).into_iter().flatten() {
             totals.ask(now_us, answer);
         }
     }
@@ -239,9 +240,11 @@ impl Cycle {
     }
 }
 
-/// The replies that a question to one node brings.
-fn answers_to(node: Node, property: PropertyId) -> [Option<Answer>; 2] {
+/// The replies that a question to one node brings; none of tactile data, see [`answer_of`].
+fn answers_to(node: Node, property: PropertyId, name: Option<&str>) -> [Option<Answer>; 2] {
     match (node, property) {
+        _ if name == Some(Property::Tact.mnemonic()) => [None; 2],
+        _ if name == Some(Property::Jp.mnemonic()) => [Some(Answer::SecondaryPosition), None],
         (Node::FORCE_TORQUE, PropertyId::FORCE_TORQUE) => [Some(Answer::Force), Some(Answer::Torque)],
         (Node::FORCE_TORQUE, PropertyId::ACCELERATION) => [Some(Answer::Acceleration), None],
         (Node::SAFETY_MODULE | Node::FORCE_TORQUE, _) => [Some(Answer::Property(property.number())), None],
@@ -256,6 +259,7 @@ fn answer_of(reply: &Reply) -> Option<(Node, Answer)> {
     Some(match *reply {
         Reply::Property { node, property, .. } => (node, Answer::Property(property.number())),
         Reply::Position { node, .. } => (node, Answer::Position),
+        Reply::SecondaryPosition { node, .. } => (node, Answer::SecondaryPosition),
         Reply::Force { node, .. } => (node, Answer::Force),
         Reply::Torque { node, .. } => (node, Answer::Torque),
         Reply::Acceleration { node, .. } => (node, Answer::Acceleration),
@@ -373,5 +377,38 @@ mod tests {
         let sum = totals.sum("can0", &decoder);
         let loads = [sum.load, sum.load_busiest].into_iter().chain(sum.kinds.iter().map(|kind| kind.load));
         assert!(loads.into_iter().all(|load| load > 0.5 && load <= 1.0), "{sum:?}");
+    }
+
+    /// Every question for the worm's encoder, or for the tactile cells, was counted as lost although it was answered.
+    ///
+    /// The change that makes it fail: an answer is looked for among ordinary values and positions alone.
+    #[test]
+    fn an_answer_in_a_format_of_its_own_is_not_lost() {
+        let finger = Node::HAND[0];
+        let id = |number| PropertyId::new(number).unwrap();
+        let (secondary, tactile) = (id(96), id(106));
+        let full = |sequence: u8| {
+            let group = puck::CanId::encode(finger, Group::TACTILE_FULL_REPLIES);
+            CanFrame::with_payload(group, [sequence << 4, 0, 0, 0, 0, 0, 0, 0])
+        };
+        let mut frames = vec![puck::device::reply16(finger, PropertyId::STAT, 2)];
+        for _ in 0..3 {
+            frames.extend([
+                puck::get(finger, secondary),
+                puck::device::secondary_position_frame(finger, puck::Counts(7)),
+            ]);
+            frames.push(puck::get(finger, tactile));
+            frames.extend((0..5).map(full));
+        }
+        let (mut totals, mut decoder) = (InterfaceTotals::default(), Decoder::default());
+        for (index, frame) in (0_u64..).zip(frames) {
+            let frame = AnyFrame::Data(frame);
+            let line = LogLine { time_us: 10_000 * index, interface: "can0".into(), frame };
+            let meaning = decoder.read(&line.frame);
+            assert!(meaning.is_named(), "{meaning:?}");
+            totals.note(&line, &meaning);
+        }
+        let [node] = &totals.sum("can0", &decoder).nodes[..] else { panic!("one node") };
+        assert_eq!((node.asked, node.answered, node.lost, node.unasked), (3, 3, 0, 1), "STAT alone was not asked for");
     }
 }
