@@ -306,6 +306,7 @@ impl Cycle {
             Command::Tare => match self.state {
                 State::Run | State::Coast => Err(state),
                 _ if self.estimator.tare() => Ok(()),
+                _ if hand.is_some() => Err((Refusal::WrenchMissing, [0, 0])),
                 _ => Err((Refusal::HandNotReady, [0, 0])),
             },
             Command::Hold => {
@@ -342,6 +343,10 @@ impl Cycle {
                     return Err((Refusal::BadValue, [4, 0]));
                 }
                 let from = self.held(hand);
+                if q.iter().zip(&hand.q).skip(1).any(|(goal, now)| goal > now) {
+                    // Fingers that are to close may hold something from now on: the last moment for a first zero.
+                    self.estimator.tare_first();
+                }
                 self.begin(Aim::Move(HandMotion::new(&from, &q, duration)), State::Approach);
                 Ok(())
             }
@@ -384,9 +389,7 @@ impl Cycle {
             return Err((Refusal::BadValue, [0, 0]));
         }
         let rollout = self.primitive.run(&from, options.speed).map_err(|_| (Refusal::BadValue, [0, 0]))?;
-        if !self.estimator.is_tared() {
-            self.estimator.tare();
-        }
+        self.estimator.tare_first();
         self.begin(Aim::Run(rollout, options), State::Run);
         Ok(())
     }

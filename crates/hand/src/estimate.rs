@@ -196,12 +196,21 @@ impl HandEstimator {
         })
     }
 
-    /// Takes the present gauges as zero; false if none have been measured.
+    /// Takes the present gauges as zero; false if none was. Those that fell silent stay as they are: what pressed on
+    /// them is no zero.
     pub fn tare(&mut self) -> bool {
-        if self.gauge_age.is_some() {
+        let present = self.gauge_age.is_some_and(|age| age <= LOST_CYCLES);
+        if present {
             self.zero = Some(*self.gauge.output());
         }
-        self.gauge_age.is_some()
+        present
+    }
+
+    /// Tares, unless that was done.
+    pub fn tare_first(&mut self) {
+        if !self.is_tared() {
+            self.tare();
+        }
     }
 
     /// True if the gauges have been tared.

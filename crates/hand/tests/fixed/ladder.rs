@@ -12,7 +12,7 @@ use sim::FingerObstacle;
 use crate::common::Movement;
 use crate::rig::{CYCLE_TICKS, OBJECT, Rig, SLOT_TICKS};
 
-fn grip() -> Movement {
+pub(crate) fn grip() -> Movement {
     let mut movement =
         Movement { start: [0.0; 4], goal: [0.0, 1.6, 1.6, 1.6], ..Movement::closing(30, 3.0, 0.0) }.feeling();
     // The hand is stiff behind its gauges: 0.2 N m of error are to move the plan by a radian.
@@ -22,15 +22,15 @@ fn grip() -> Movement {
     movement
 }
 
-fn run(options: RunOptions) -> Request {
+pub(crate) fn run(options: RunOptions) -> Request {
     Request::Run { name: Name::new("grip").expect("a name"), options }
 }
 
-fn adapt() -> RunOptions {
+pub(crate) fn adapt() -> RunOptions {
     RunOptions { feedback: true, force_control: true, ..RunOptions::default() }
 }
 
-fn gripping(options: RunOptions) -> Rig {
+pub(crate) fn gripping(options: RunOptions) -> Rig {
     let mut rig = Rig::ready(OBJECT);
     rig.upload("grip", &grip().image("grip"));
     rig.accept(run(options));
@@ -38,7 +38,7 @@ fn gripping(options: RunOptions) -> Rig {
 }
 
 /// The latest torques on the bus, units of the pucks.
-fn torques(rig: &Rig) -> Vec<[i16; 4]> {
+pub(crate) fn torques(rig: &Rig) -> Vec<[i16; 4]> {
     let requests = rig.plant.recorded().iter().filter_map(|passage| puck::Request::decode(&passage.frame).ok());
     requests
         .filter_map(|request| match request.action {

@@ -1,0 +1,51 @@
+//! Rungs of the ladder that are reached after something went wrong: a jammed bus, gauges that are silent, heat, and
+//! pucks that restart while nobody drives them.
+
+use control::State;
+use hand::number::real;
+use link::{Refusal, Request, RunOptions};
+use puck::{CanFrame, PropertyId, Reply};
+
+use crate::common::Movement;
+use crate::ladder::{adapt, grip, gripping, run};
+use crate::rig::{OBJECT, Rig};
+
+/// True for the reading of a gauge.
+fn is_gauge(frame: &CanFrame) -> bool {
+    matches!(Reply::decode(frame), Ok(Reply::Property { property, .. }) if Some(property) == PropertyId::new(25))
+}
+
+/// What pressed on a finger when its gauge fell silent became its zero.
+///
+/// The change that makes it fail: gauges that have been measured at some time are tared.
+#[test]
+fn gauges_of_a_hand_alone_that_fell_silent_are_not_tared() {
+    let mut rig = gripping(adapt());
+    rig.wait(6.0, |rig| rig.health().state == State::Hold);
+    rig.lose = Box::new(|frame, _| is_gauge(frame));
+    rig.run(0.5);
+    assert_eq!(rig.refusal(Request::Tare), Refusal::WrenchMissing);
+    rig.lose = Box::new(|_, _| false);
+    rig.run(0.1);
+    rig.accept(Request::Tare);
+}
+
+/// A hand that was closed on something right after its initialisation felt nothing in the run that followed.
+///
+/// The change that makes it fail: the first zero is taken when a run begins, and not before a move that closes.
+#[test]
+fn b5_a_hand_alone_does_not_take_a_grip_for_the_zero_of_gauges_that_nobody_has_tared() {
+    let mut rig = Rig::ready(OBJECT);
+    let closed = [0.0, 1.7, 1.7, 1.7];
+    rig.accept(Request::MoveHand { q: closed, duration: 1.0 });
+    rig.wait(4.0, |rig| rig.health().state == State::Hold);
+    rig.run(0.5);
+    let pressed = rig.now().gauges.map(real);
+    assert!(pressed.iter().all(|gauge| *gauge < -0.1), "{pressed:?}");
+    let movement = Movement { start: closed, goal: closed, ..grip() };
+    rig.upload("grip", &movement.image("grip"));
+    rig.accept(run(RunOptions::default()));
+    rig.run(0.1);
+    let felt = rig.now().gauges.map(real);
+    assert!(felt.iter().zip(pressed).all(|(felt, pressed)| (felt - pressed).abs() < 0.05), "{pressed:?} {felt:?}");
+}
