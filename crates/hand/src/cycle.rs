@@ -138,6 +138,11 @@ impl Cycle {
         }
     }
 
+    /// The torques of the last cycle did not leave. The next step counts from those that did.
+    pub fn not_sent(&mut self) {
+        self.limiter.not_sent();
+    }
+
     fn is_active(&self) -> bool {
         matches!(self.state, State::Approach | State::Run | State::Coast)
     }

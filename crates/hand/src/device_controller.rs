@@ -149,10 +149,13 @@ impl DeviceController {
         if output.arrived {
             self.news(io, EventKind::Arrived, 0, 0);
         }
-        if self.stage == HandStage::Ready
-            && let Some(frame) = self.drive.torque_frame(output.frame)
-        {
-            SlotOutlet { io, counters: &mut self.counters, now_us }.send(frame);
+        if self.stage == HandStage::Ready {
+            let frame = self.drive.torque_frame(output.frame);
+            let mut outlet = SlotOutlet { io, counters: &mut self.counters, now_us };
+            let left = frame.is_some_and(|frame| outlet.send(frame));
+            if output.frame.is_some() && !left {
+                self.cycle.not_sent();
+            }
         }
     }
 

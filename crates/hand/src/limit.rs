@@ -73,23 +73,31 @@ impl Scales {
 #[derive(Clone, Debug)]
 pub struct HandLimiter {
     last: [Number; DIGITS],
+    /// The torques before the last, in case those do not leave.
+    before: [Number; DIGITS],
 }
 
 impl HandLimiter {
     /// A limiter at zero torque.
     pub const fn new() -> Self {
-        HandLimiter { last: [ZERO; DIGITS] }
+        HandLimiter { last: [ZERO; DIGITS], before: [ZERO; DIGITS] }
     }
 
     /// Back to zero torque at once: nothing is being sent.
     pub fn reset(&mut self) {
-        self.last = [ZERO; DIGITS];
+        *self = HandLimiter::new();
+    }
+
+    /// The torques of the last cycle did not leave: the next step counts from those before.
+    pub fn not_sent(&mut self) {
+        self.last = self.before;
     }
 
     /// Cuts the wanted torques (N m) of one cycle to magnitude and rate; also whether a finger was cut to its
     /// magnitude.
     pub fn limit(&mut self, wanted: &[Number; DIGITS]) -> (LimitedTorques, bool) {
         let mut saturated = false;
+        self.before = self.last;
         for (digit, last) in self.last.iter_mut().enumerate() {
             let kept = within(wanted[digit], LIMITS[digit]);
             saturated |= digit > 0 && kept != wanted[digit];

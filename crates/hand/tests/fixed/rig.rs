@@ -33,6 +33,8 @@ struct Queues {
     commands: VecDeque<Command>,
     records: VecDeque<TimedRecord<Record>>,
     events: VecDeque<Message>,
+    /// The CAN controller has no room.
+    full: bool,
 }
 
 impl ControllerIo<DeviceController> for Queues {
@@ -40,8 +42,10 @@ impl ControllerIo<DeviceController> for Queues {
         self.received.pop_front()
     }
     fn transmit(&mut self, frame: CanFrame) -> bool {
-        self.sent.push(frame);
-        true
+        if !self.full {
+            self.sent.push(frame);
+        }
+        !self.full
     }
     fn command(&mut self) -> Option<Command> {
         self.commands.pop_front()
@@ -220,6 +224,11 @@ impl Rig {
     /// The CAN controller leaves the bus, and comes back at once.
     pub(crate) fn bus_off(&mut self) {
         self.core.note_bus_error(true);
+    }
+
+    /// The CAN controller takes no frames from now on, or takes them again.
+    pub(crate) fn jam(&mut self, full: bool) {
+        self.queues.full = full;
     }
 
     /// So many seconds.
