@@ -5,13 +5,13 @@
 //! |---|---|
 //! | request | GET P and GET SG to the group of the hand |
 //! | control | the replies of this very cycle, [`Cycle::step`], the torque frame |
-//! | slow | one of: initialisation, MODE where it is due, STAT of a silent puck, MODE and TEMP in turn |
+//! | slow | one of: initialisation, MODE where due, STAT of a silent puck; MODE, TEMP and, unless ready, STAT in turn |
 //!
 //! On a bus of its own the hand is answered within one slot of 300 Hz: 1015 us at worst, stuffing and puck latency
 //! included, of 1111. At a rate with shorter slots the slow one comes between ([`Slot::next`]). The torque leaves in
 //! the cycle of its sample, one cycle earlier than behind an arm.
 
-use control::{LoadRefusal, Payload};
+use control::{LoadRefusal, Payload, State};
 use device::bus::Outlet;
 use device::hand::{Drive, HandFailure, HandProperties, HandRound, Initialisation, Outcome};
 use device::{Controller, ControllerIo, Counters, Health, Message, Refused, Slot, Stage, StoredWeight};
@@ -34,6 +34,9 @@ const TEMPERATURE: PropertyId = match PropertyId::new(9) {
     None => unreachable!(),
 };
 
+/// Questions in a row that a puck leaves unanswered before a hand that is not driven is given up: half a second.
+const UNHEARD: u8 = 5;
+
 /// Slow slots between two polls; every eighth poll is a temperature, the others are modes: each digit's mode at 8 Hz.
 const POLL_SLOTS: u32 = 8;
 
@@ -52,6 +55,8 @@ pub struct DeviceController {
     drive: Drive,
     asked: Option<Node>,
     polled: Option<(Node, PropertyId)>,
+    /// Questions for STAT since each puck last answered one, while the hand is not driven.
+    unheard: [u8; DIGITS],
     tick: u32,
     temperatures: [Option<i16>; DIGITS],
     counters: Counters,
@@ -95,6 +100,7 @@ impl DeviceController {
             drive: Drive::resting(false),
             asked: None,
             polled: None,
+            unheard: [0; DIGITS],
             tick: 0,
             temperatures: [None; DIGITS],
             counters: Counters::default(),
@@ -192,6 +198,8 @@ impl DeviceController {
         if let Some(node) = suspect {
             self.asked = Some(node);
             outlet.send(get(node, PropertyId::STAT));
+        } else if self.stage != HandStage::Ready && self.tick % POLL_SLOTS == POLL_SLOTS / 2 {
+            self.ask_whether_awake(now_us, io);
         } else if self.tick.is_multiple_of(POLL_SLOTS) {
             let turn = self.tick / POLL_SLOTS;
             let property = if turn.is_multiple_of(5) { TEMPERATURE } else { PropertyId::MODE };
@@ -200,6 +208,24 @@ impl DeviceController {
                 self.polled = Some((*node, property));
                 outlet.send(get(*node, property));
             }
+        }
+    }
+
+    /// Nothing else tells of a puck of a hand that is not driven that has restarted, or has no power any more: they take
+    /// turns.
+    fn ask_whether_awake(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
+        let digit = (self.tick / POLL_SLOTS) as usize % DIGITS;
+        let (Some(node), Some(unheard)) = (Node::HAND.get(digit).copied(), self.unheard.get_mut(digit)) else {
+            return;
+        };
+        if *unheard >= UNHEARD {
+            self.fail(node, HandFailure::Silent);
+            return;
+        }
+        let mut outlet = SlotOutlet { io, counters: &mut self.counters, now_us };
+        if outlet.send(get(node, PropertyId::STAT)) {
+            *unheard += 1;
+            self.asked = Some(node);
         }
     }
 
@@ -243,6 +269,9 @@ impl DeviceController {
         }
         if property == PropertyId::STAT && self.asked == Some(node) {
             self.asked = None;
+            if let Some(unheard) = self.unheard.get_mut(digit) {
+                *unheard = 0;
+            }
             if Status::from_value(value) != Some(Status::Ready) {
                 self.fail(node, HandFailure::Reset);
             }
@@ -270,7 +299,8 @@ impl DeviceController {
     }
 
     fn begin_initialisation(&mut self, now_us: u64) {
-        let driven = self.stage == HandStage::Ready;
+        // Braking after a stop: that word may not have left.
+        let driven = self.stage == HandStage::Ready || self.drive.mode_frame().is_some();
         self.enter(HandStage::Initialising, None);
         self.drive = Drive::resting(false);
         self.initialisation = Some(Initialisation::new(driven, now_us));
@@ -297,6 +327,7 @@ impl DeviceController {
         self.drive = Drive::resting(stage != HandStage::Ready);
         self.asked = None;
         self.polled = None;
+        self.unheard = [0; DIGITS];
     }
 
     /// Tells what is new of start-up and hand.
@@ -370,7 +401,8 @@ impl Controller for DeviceController {
                 Phase::Done => Stage::Ready,
             },
             state: self.cycle.state(),
-            law: self.cycle.state(),
+            // Lost replies are bridged in a run alone.
+            law: if self.cycle.state() == State::Coast { State::Run } else { self.cycle.state() },
             fault: self.cycle.fault(),
             hand: self.stage,
             // A move is a state of the cycle.

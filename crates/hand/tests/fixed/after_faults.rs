@@ -1,11 +1,14 @@
 //! Rungs of the ladder that are reached after something went wrong: a jammed bus, gauges that are silent, heat, and
 //! pucks that restart while nobody drives them.
 
-use control::{RATE, State};
+use control::{Fault, RATE, State};
+use device::HandFailure;
+use device::time::SLOT_HZ;
 use hand::number::real;
-use link::{Refusal, Request, RunOptions};
+use link::{EventKind, HandStage, Refusal, Request, RunOptions};
+use puck::device::reply32;
 use puck::hand::INNER_LINK_RATIO;
-use puck::{CanFrame, PropertyId, Reply};
+use puck::{CanFrame, Group, MotorMode, Node, PropertyId, Reply, Status};
 use sim::{FingerObstacle, HandConfig};
 
 use crate::common::Movement;
@@ -79,4 +82,84 @@ fn b5_a_hand_alone_does_not_take_a_grip_for_the_zero_of_gauges_that_nobody_has_t
     rig.run(0.1);
     let felt = rig.now().gauges.map(real);
     assert!(felt.iter().zip(pressed).all(|(felt, pressed)| (felt - pressed).abs() < 0.05), "{pressed:?} {felt:?}");
+}
+
+/// True for a frame that comes from this puck.
+fn is_from(frame: &CanFrame, node: Node) -> bool {
+    frame.can_id().raw() >> 5 & 0x1F == u16::from(node.number())
+}
+
+/// A puck that slept in its boot loader was told only when an initialisation had failed for it, and a hand without
+/// power stayed "not initialised" for ever.
+///
+/// The change that makes it fail: a hand alone that is not initialised is asked for MODE and TEMP alone.
+#[test]
+fn g2_a_puck_of_a_hand_alone_that_restarts_or_goes_before_the_initialisation_is_told_within_a_second() {
+    for (restarts, failure) in [(true, HandFailure::Reset), (false, HandFailure::Silent)] {
+        let mut rig = Rig::new(FingerObstacle::NOTHING);
+        rig.wait(5.0, |rig| rig.health().hand == HandStage::NotInitialised);
+        rig.run(2.0);
+        assert_eq!(rig.health().hand, HandStage::NotInitialised, "a hand that answers is left alone");
+        let lost = Node::FINGERS[1];
+        rig.lose = Box::new(move |frame, _| is_from(frame, lost));
+        for _ in 0..SLOT_HZ {
+            if restarts {
+                rig.hear(reply32(lost, PropertyId::STAT, Status::Reset.value()));
+            }
+            rig.step();
+        }
+        assert_eq!(rig.health().hand, HandStage::Failed);
+        let told = |reply: &link::Reply| {
+            matches!(reply, link::Reply::Event(event)
+            if event.kind == EventKind::Hand && event.detail == failure.number(lost))
+        };
+        assert!(rig.heard.iter().any(told), "{failure:?}");
+        rig.lose = Box::new(|_, _| false);
+        rig.wait(5.0, |rig| rig.health().hand == HandStage::NotInitialised);
+        rig.accept(Request::InitialiseHand);
+        rig.wait(20.0, |rig| rig.health().hand == HandStage::Ready);
+    }
+}
+
+/// The change that makes it fail: an initialisation forgets a word to brake that has not left.
+#[test]
+fn g11_a_hand_alone_that_is_initialised_right_after_a_stop_is_braked_first() {
+    let mut rig = Rig::new(FingerObstacle::NOTHING);
+    rig.wait(5.0, |rig| rig.health().hand == HandStage::NotInitialised);
+    rig.accept(Request::InitialiseHand);
+    rig.run(0.5);
+    rig.jam(true);
+    rig.accept(Request::Stop);
+    rig.accept(Request::InitialiseHand);
+    rig.jam(false);
+    rig.sent.clear();
+    rig.run(0.05);
+    let idle = puck::set(Group::HAND, PropertyId::MODE, MotorMode::Idle.value());
+    assert_eq!(rig.sent.first(), Some(&idle));
+    rig.wait(20.0, |rig| rig.health().hand == HandStage::Ready);
+}
+
+/// Two digits that are lost in turn: no cycle is complete, and none is silent for six.
+///
+/// The change that makes it fail: a host is watched by the state of the hand, and not by the law that acts.
+#[test]
+fn g5_a_run_of_a_hand_alone_without_its_host_is_stopped_also_while_replies_are_bridged() {
+    let mut rig = gripping(RunOptions::default());
+    rig.run(0.5);
+    let turn = std::cell::Cell::new(0);
+    rig.lose = Box::new(move |frame, _| {
+        let [first, second, ..] = Node::FINGERS;
+        if !matches!(Reply::decode(frame), Ok(Reply::Position { .. })) {
+            return false;
+        }
+        // The spread answers last: its reply ends the cycle.
+        let odd = turn.get() % 2 == 1;
+        turn.set(turn.get() + u32::from(is_from(frame, Node::SPREAD)));
+        is_from(frame, if odd { first } else { second })
+    });
+    rig.run(0.1);
+    assert_eq!(rig.health().state, State::Coast);
+    rig.alive = false;
+    rig.run(0.7);
+    assert_eq!(rig.health().state, State::SoftStop);
 }
