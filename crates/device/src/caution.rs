@@ -19,14 +19,14 @@ const HYSTERESIS: i16 = 5;
 
 /// The present findings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Watch {
+pub struct Watch {
     /// Number of the three temperatures that have been passed.
     heat: u8,
 }
 
 impl Watch {
     /// Takes the temperatures known so far and the latest word of the pendant.
-    pub(crate) fn look(&mut self, temperatures: impl Iterator<Item = i16>, pendant: Option<i32>) -> Caution {
+    pub fn look(&mut self, temperatures: impl Iterator<Item = i16>, pendant: Option<i32>) -> Caution {
         let hottest = temperatures.max().unwrap_or(0);
         self.heat = (1u8..).zip([WARM, HOT, TOO_HOT]).fold(0, |heat, (level, limit)| {
             let left = if self.heat >= level { limit.saturating_sub(HYSTERESIS) } else { limit };
@@ -42,7 +42,7 @@ impl Watch {
     }
 
     /// True while a motor is too hot to go on.
-    pub(crate) fn is_too_hot(self) -> bool {
+    pub fn is_too_hot(self) -> bool {
         self.heat >= 3
     }
 }

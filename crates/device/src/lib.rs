@@ -28,6 +28,7 @@ pub use application::{
     TimedRecord, finite,
 };
 pub use calibration::{Home, HomeError, StoredHome};
+pub use caution::Watch;
 pub use command::{Command, Refusal};
 pub use controller::DeviceController;
 pub use event::{Event, EventKind};

@@ -5,7 +5,7 @@
 //!     |  ------Run--> Run <-> Coast (1..5 cycles of lost replies)
 //!     |                |--> Hold (arrived: what is gripped stays gripped)
 //!     |                |--> SoftStop   torque off, the worm drives hold: a person's stop, a silent host,
-//!     |                |               6 cycles of lost replies
+//!     |                |               6 cycles of lost replies, a motor that is too hot
 //!     |                '--> Fault      a puck under torque tells that it was reset
 //!     <---ClearFault---- SoftStop, Fault
 //! ```
@@ -84,6 +84,8 @@ pub struct Cycle {
     fade: Number,
     saturated: bool,
     driven: bool,
+    /// A motor is too hot to be driven.
+    hot: bool,
     primitive: FingerPrimitive,
 }
 
@@ -103,6 +105,7 @@ impl Cycle {
             fade: ZERO,
             saturated: false,
             driven: false,
+            hot: false,
             primitive: FingerPrimitive::EMPTY,
         }
     }
@@ -138,6 +141,11 @@ impl Cycle {
         }
     }
 
+    /// Whether a motor is too hot to be driven, from the next cycle on.
+    pub fn heat(&mut self, hot: bool) {
+        self.hot = hot;
+    }
+
     /// The torques of the last cycle did not leave. The next step counts from those that did.
     pub fn not_sent(&mut self) {
         self.limiter.not_sent();
@@ -154,6 +162,9 @@ impl Cycle {
         if hand.is_none() && !matches!(self.aim, Aim::None) {
             self.hand_failed();
             self.aim = Aim::None;
+        }
+        if self.hot && !matches!(self.aim, Aim::None) {
+            self.stop(State::SoftStop, Fault::MotorHot);
         }
         let answer = command.map(|command| self.command(command, hand.as_ref()));
         let mut record = Record { cycle: self.count, ..Record::EMPTY };
@@ -337,7 +348,7 @@ impl Cycle {
                 }
             }
             Command::Move { q, duration } => {
-                let hand = answering(hand)?;
+                let hand = self.drivable(hand)?;
                 if matches!(self.state, State::Run | State::Coast) {
                     return Err(state);
                 }
@@ -356,7 +367,7 @@ impl Cycle {
                 Ok(())
             }
             Command::Run(options) => {
-                let hand = answering(hand)?;
+                let hand = self.drivable(hand)?;
                 if self.is_active() {
                     return Err(state);
                 }
@@ -368,7 +379,7 @@ impl Cycle {
     fn clear_fault(&mut self, hand: Option<&HandState>) -> Result<(), Refused> {
         if matches!(self.state, State::Fault | State::SoftStop) {
             // Without a hand nothing can be driven: clearing makes way for its initialisation.
-            if hand.is_some_and(|hand| hand.oldest() > 0) {
+            if self.hot || hand.is_some_and(|hand| hand.oldest() > 0) {
                 return Err((Refusal::CauseRemains, [0, 0]));
             }
             self.state = State::Idle;
@@ -399,6 +410,16 @@ impl Cycle {
         Ok(())
     }
 
+    /// The state of a hand that may be driven: every digit answered in this cycle, and no motor is too hot.
+    fn drivable<'a>(&self, hand: Option<&'a HandState>) -> Result<&'a HandState, Refused> {
+        match hand {
+            None => Err((Refusal::HandNotReady, [0, 0])),
+            Some(hand) if hand.oldest() > 0 => Err((Refusal::PositionsMissing, [0, 0])),
+            Some(_) if self.hot => Err((Refusal::CauseRemains, [0, 0])),
+            Some(hand) => Ok(hand),
+        }
+    }
+
     /// Where the hand is held, or is (rad).
     fn held(&self, hand: &HandState) -> [Number; DIGITS] {
         match &self.aim {
@@ -423,13 +444,4 @@ impl Default for Cycle {
 
 fn in_range(value: Number, [low, high]: [Number; 2]) -> bool {
     value >= low && value <= high
-}
-
-/// The state of a hand of which every digit answered in this cycle.
-fn answering(hand: Option<&HandState>) -> Result<&HandState, Refused> {
-    match hand {
-        None => Err((Refusal::HandNotReady, [0, 0])),
-        Some(hand) if hand.oldest() > 0 => Err((Refusal::PositionsMissing, [0, 0])),
-        Some(hand) => Ok(hand),
-    }
 }

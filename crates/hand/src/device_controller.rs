@@ -14,7 +14,7 @@
 use control::{LoadRefusal, Payload, State};
 use device::bus::Outlet;
 use device::hand::{Drive, HandFailure, HandProperties, HandRound, Initialisation, Outcome};
-use device::{Controller, ControllerIo, Counters, Health, Message, Refused, Slot, Stage, StoredWeight};
+use device::{Controller, ControllerIo, Counters, Health, Message, Refused, Slot, Stage, StoredWeight, Watch};
 use link::{Event as LinkEvent, EventKind, HandStage, Refusal};
 use puck::{CanFrame, Node, PropertyId, Reply, Status, get};
 
@@ -59,6 +59,7 @@ pub struct DeviceController {
     unheard: [u8; DIGITS],
     tick: u32,
     temperatures: [Option<i16>; DIGITS],
+    watch: Watch,
     counters: Counters,
 }
 
@@ -103,6 +104,7 @@ impl DeviceController {
             unheard: [0; DIGITS],
             tick: 0,
             temperatures: [None; DIGITS],
+            watch: Watch::default(),
             counters: Counters::default(),
         }
     }
@@ -136,6 +138,7 @@ impl DeviceController {
             }
             _ => None,
         };
+        self.cycle.heat(self.watch.is_too_hot());
         let output = self.cycle.step(sample.as_ref(), command.filter(|_| refused.is_none()));
         let record = Record { cycle: self.cycles, ..output.record };
         io.record(record);
@@ -283,6 +286,7 @@ impl DeviceController {
                 self.drive.hear_mode(node, value);
             } else if let Some(place) = self.temperatures.get_mut(digit) {
                 *place = i16::try_from(value).ok();
+                self.watch.look(self.temperatures.iter().copied().flatten(), None);
             }
             return true;
         }
@@ -314,6 +318,8 @@ impl DeviceController {
             // failed.
             self.properties = None;
             self.startup = Startup::new();
+            self.temperatures = [None; DIGITS];
+            self.watch = Watch::default();
         }
     }
 

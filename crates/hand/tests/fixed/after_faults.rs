@@ -163,3 +163,47 @@ fn g5_a_run_of_a_hand_alone_without_its_host_is_stopped_also_while_replies_are_b
     rig.run(0.7);
     assert_eq!(rig.health().state, State::SoftStop);
 }
+
+/// A grip that is kept for hours heated its motors, and nobody stopped them.
+///
+/// The change that makes it fail: the temperatures of a hand alone are shown and nothing else.
+#[test]
+fn g14_a_motor_of_a_hand_alone_that_is_too_hot_ends_its_torque_until_it_is_cooler() {
+    let hot = |rig: &mut Rig, celsius: i32, seconds: f64| {
+        for _ in 0..(seconds * f64::from(SLOT_HZ)) as usize {
+            for node in Node::HAND {
+                rig.hear(reply32(node, PropertyId::new(9).expect("TEMP"), celsius));
+            }
+            rig.step();
+        }
+    };
+    let mut rig = gripping(adapt());
+    rig.wait(6.0, |rig| rig.health().state == State::Hold);
+    rig.lose = Box::new(
+        |frame, _| matches!(Reply::decode(frame), Ok(Reply::Property { property, .. }) if Some(property) == PropertyId::new(9)),
+    );
+    hot(&mut rig, 79, 5.0);
+    assert_eq!((rig.health().state, rig.health().fault), (State::Hold, Fault::None));
+    hot(&mut rig, 80, 3.0);
+    assert_eq!((rig.health().state, rig.health().fault), (State::SoftStop, Fault::MotorHot));
+    assert_eq!(rig.now().torque, [dmp::Scalar::ZERO; 4]);
+    assert_eq!(rig.refusal(Request::ClearFault), Refusal::CauseRemains);
+    hot(&mut rig, 75, 3.0);
+    assert_eq!(rig.refusal(Request::ClearFault), Refusal::CauseRemains);
+    hot(&mut rig, 74, 3.0);
+    rig.accept(Request::ClearFault);
+    // Nobody drives a hand that became hot at rest.
+    hot(&mut rig, 80, 3.0);
+    assert_eq!((rig.health().state, rig.health().fault), (State::Idle, Fault::None));
+    assert_eq!(rig.refusal(Request::MoveHand { q: [0.0; 4], duration: 1.0 }), Refusal::CauseRemains);
+    assert_eq!(rig.refusal(run(adapt())), Refusal::CauseRemains);
+    // What was measured of a hand that is gone says nothing.
+    rig.lose = Box::new(|_, _| true);
+    rig.run(0.5);
+    assert_eq!((rig.health().hand, rig.health().hand_temperatures), (HandStage::Failed, [None; 4]));
+    rig.lose = Box::new(|_, _| false);
+    rig.wait(5.0, |rig| rig.health().hand == HandStage::NotInitialised);
+    rig.accept(Request::InitialiseHand);
+    rig.wait(20.0, |rig| rig.health().hand == HandStage::Ready);
+    rig.accept(Request::MoveHand { q: [0.0; 4], duration: 1.0 });
+}
