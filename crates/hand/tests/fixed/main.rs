@@ -8,3 +8,4 @@ mod image;
 mod ladder;
 mod rig;
 mod saturation;
+mod sequences;
