@@ -9,8 +9,9 @@ use crate::mailbox::Mailbox;
 /// Rounds in a row without a position after which a puck is suspected to have reset.
 const SUSPECT_ROUNDS: u16 = 2;
 
-/// Largest reading of a strain gauge: 12 bits.
-const GAUGE_LIMIT: i32 = 4095;
+/// Readings of a strain gauge that tell a torque. At an end of its 12 bits, 0 and 4095, it is saturated or its cable is
+/// off: 2.8 N m, more than a finger's drive can press.
+const GAUGE_RANGE: core::ops::RangeInclusive<i32> = 1..=4094;
 
 /// The replies of one round, each in the slot of its sender.
 #[derive(Clone, Copy, Debug, Default)]
@@ -56,10 +57,7 @@ impl HandRound {
             *missed = if position.is_some() { 0 } else { missed.saturating_add(1) };
         }
         let gauges = self.gauges.map(|mailbox| {
-            mailbox
-                .reply()
-                .filter(|value| (0..=GAUGE_LIMIT).contains(value))
-                .and_then(|value| u16::try_from(value).ok())
+            mailbox.reply().filter(|value| GAUGE_RANGE.contains(value)).and_then(|value| u16::try_from(value).ok())
         });
         let lost = positions.iter().filter(|position| position.is_none()).count()
             + gauges.iter().filter(|gauge| gauge.is_none()).count();
@@ -121,14 +119,19 @@ mod tests {
         for (digit, counts) in [(0, 5), (0, 6), (1, 7), (1, 7), (2, 8)] {
             round.take_position(digit, Counts(counts), Some(Counts(counts)), &mut counters);
         }
-        for (digit, value) in [(0, -1), (1, 4096), (2, 4095)] {
+        for (digit, value) in [(0, 0), (1, 4095), (2, 4094)] {
             round.take_gauge(digit, value, &mut counters);
         }
         let sample = round.close(&mut counters).expect("a sample");
         assert_eq!(sample.primary, [None, Some(Counts(7)), Some(Counts(8)), None]);
         assert_eq!(sample.secondary, [None, Some(Counts(7)), Some(Counts(8))]);
-        assert_eq!(sample.gauges, [None, None, Some(4095)]);
+        assert_eq!(sample.gauges, [None, None, Some(4094)]);
         assert_eq!((counters.hand_lost_replies, counters.late_replies), (4, 3));
+        round.open(gauge());
+        for (digit, value) in [(0, -1), (1, 4096), (2, 1)] {
+            round.take_gauge(digit, value, &mut counters);
+        }
+        assert_eq!(round.close(&mut counters).map(|sample| sample.gauges), Some([None, None, Some(1)]));
     }
 
     #[test]

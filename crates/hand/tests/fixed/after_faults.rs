@@ -4,6 +4,7 @@
 use control::{Fault, RATE, State};
 use device::HandFailure;
 use device::time::SLOT_HZ;
+use dmp::Scalar;
 use hand::number::real;
 use link::{EventKind, HandStage, Refusal, Request, RunOptions};
 use puck::device::reply32;
@@ -186,7 +187,7 @@ fn g14_a_motor_of_a_hand_alone_that_is_too_hot_ends_its_torque_until_it_is_coole
     assert_eq!((rig.health().state, rig.health().fault), (State::Hold, Fault::None));
     hot(&mut rig, 80, 3.0);
     assert_eq!((rig.health().state, rig.health().fault), (State::SoftStop, Fault::MotorHot));
-    assert_eq!(rig.now().torque, [dmp::Scalar::ZERO; 4]);
+    assert_eq!(rig.now().torque, [Scalar::ZERO; 4]);
     assert_eq!(rig.refusal(Request::ClearFault), Refusal::CauseRemains);
     hot(&mut rig, 75, 3.0);
     assert_eq!(rig.refusal(Request::ClearFault), Refusal::CauseRemains);
@@ -206,4 +207,28 @@ fn g14_a_motor_of_a_hand_alone_that_is_too_hot_ends_its_torque_until_it_is_coole
     rig.accept(Request::InitialiseHand);
     rig.wait(20.0, |rig| rig.health().hand == HandStage::Ready);
     rig.accept(Request::MoveHand { q: [0.0; 4], duration: 1.0 });
+}
+
+/// A gauge whose cable was off read 4095: 2.8 N m, and its finger opened under force control and let go.
+///
+/// The change that makes it fail: a reading at an end of the range counts as measured.
+#[test]
+fn a_gauge_at_an_end_of_its_range_tells_nothing_and_position_goes_on() {
+    for end in [0, 4095] {
+        let mut rig = gripping(adapt());
+        rig.wait(6.0, |rig| rig.health().state == State::Hold);
+        rig.run(0.5);
+        let before = rig.now();
+        let broken = Node::FINGERS[0];
+        rig.lose = Box::new(move |frame, _| is_gauge(frame) && is_from(frame, broken));
+        for _ in 0..SLOT_HZ {
+            rig.hear(reply32(broken, PropertyId::new(25).expect("SG"), end));
+            rig.step();
+        }
+        let moved = (rig.now().q[1] - before.q[1]).to_f64();
+        println!("{end}: {moved:.3} rad, torque {:?}", rig.now().torque.map(real));
+        assert!(moved.abs() < 0.05, "a reading of {end} moves the finger by {moved} rad");
+        assert_eq!(rig.health().state, State::Hold);
+        assert!(rig.now().flags & control::flags::WRENCH_STALE != 0, "and it is told");
+    }
 }
