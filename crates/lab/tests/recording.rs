@@ -371,6 +371,28 @@ fn cli_8_lost_samples_are_counted_by_the_cycle_counter_and_by_time() {
     assert_eq!((recording.gaps, recording.missing_samples), (1, 5));
 }
 
+/// Seen: an addition that overflowed, and 18446744073709551614 missing samples.
+///
+/// The change that makes it fail: a typical step of two lines of the same sample.
+#[test]
+fn lines_that_are_the_same_sample_twice_hide_no_samples_between_the_others() {
+    let text = common::foreign(1.0);
+    let (head, samples): (Vec<&str>, Vec<&str>) = text.lines().partition(|line| line.starts_with(['#', 't']));
+    let of = |times: &dyn Fn(usize) -> Vec<String>| {
+        let lines = samples.iter().enumerate().flat_map(|(index, line)| {
+            let (_, rest) = line.split_once(',').unwrap();
+            times(index).into_iter().map(move |time| format!("{time},{rest}"))
+        });
+        let text = format!("{}\n{}", head.join("\n"), lines.collect::<Vec<_>>().join("\n"));
+        let recording = parse(&text).unwrap();
+        (recording.gaps, recording.missing_samples)
+    };
+    let shown = |index: usize| index as f64 / 300.0;
+    assert_eq!(of(&|index| (0..3).map(|nth| format!("{:.9}", shown(index) + f64::from(nth) * 1e-9)).collect()), (0, 0));
+    let tiny = |index: usize| if index < 800 { index as f64 * 1e-300 } else { shown(index - 799) };
+    assert_eq!(of(&|index| vec![format!("{:e}", tiny(index))]), (0, 0));
+}
+
 #[test]
 fn a_counter_that_begins_anew_is_no_gap_of_four_thousand_million_samples() {
     let mut rows = common::rows(2.0);

@@ -25,6 +25,10 @@ const LARGEST_VALUE: f64 = 1e12;
 /// Two samples further apart than this many typical sample periods have a gap between them.
 const GAP_FACTOR: f64 = 1.5;
 
+/// No recorder has a shorter sample period, s. Samples nearer to each other are the same one written twice, with the
+/// rounding of their times between them, and tell nothing of the period.
+const SHORTEST_PERIOD: f64 = 1e-5;
+
 /// Everything that was recorded, one entry per line of the file in each column that exists.
 #[derive(Clone, PartialEq)]
 pub struct Recording {
@@ -247,9 +251,9 @@ pub fn notes(bytes: &[u8]) -> Vec<String> {
 /// Number of gaps, samples missing in them, and the longest step with the index of its later end.
 fn count_gaps(time: &[f64], cycle: Option<&[u32]>) -> (usize, usize, (f64, usize)) {
     let steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let mut sorted = steps.clone();
+    let mut sorted: Vec<f64> = steps.iter().copied().filter(|step| *step >= SHORTEST_PERIOD).collect();
     sorted.sort_by(f64::total_cmp);
-    let typical = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let typical = sorted.get(sorted.len() / 2).copied().unwrap_or(f64::INFINITY);
     let longest = steps.iter().enumerate().fold(
         (0.0, 0),
         |best, (index, step)| {
