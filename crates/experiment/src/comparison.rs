@@ -72,7 +72,10 @@ pub struct Ratio {
     pub max: Option<f64>,
     /// Median in open loop and with adaptation, SI.
     pub medians: [Option<f64>; 2],
-    /// Ratio of each trial that is compared: cell, seed, ratio.
+    /// Pairs of which only the one with adaptation has any of the quantity: they count as above the bar, and have no
+    /// ratio.
+    pub without_ratio: usize,
+    /// Ratio of each trial that has one: cell, seed, ratio.
     pub trials: Vec<(String, u64, f64)>,
 }
 
@@ -110,11 +113,9 @@ impl Comparison {
         let compared = pairs.len();
         let share = |count: usize| count as f64 / compared as f64;
         let pairs: Vec<_> = pairs.into_iter().filter(|(_, adapted)| !adapted.is_stopped()).collect();
-        let ratio = |quantity: &Quantity, (open, adapted): &(&Report, &Report)| {
-            (quantity.value)(&adapted.measures) / (quantity.value)(&open.measures).max(f64::MIN_POSITIVE)
-        };
         let ratios = quantities.iter().map(|quantity| {
-            let values: Vec<f64> = pairs.iter().map(|pair| ratio(quantity, pair)).collect();
+            let found: Vec<Option<f64>> = pairs.iter().map(|pair| ratio(quantity, pair)).collect();
+            let values: Vec<f64> = found.iter().copied().flatten().collect();
             let median = |values: &[f64]| quantile(values, 0.5);
             let of = |pick: fn(&(&Report, &Report)) -> Measures| {
                 median(&pairs.iter().map(|pair| (quantity.value)(&pick(pair))).collect::<Vec<_>>())
@@ -126,14 +127,17 @@ impl Comparison {
                 median: median(&values),
                 max: quantile(&values, 1.0),
                 medians: [of(|(open, _)| open.measures), of(|(_, adapted)| adapted.measures)],
+                without_ratio: found.len() - values.len(),
                 trials: pairs
                     .iter()
-                    .zip(&values)
-                    .map(|((open, _), value)| (open.key.cell.to_string(), open.key.seed, *value))
+                    .zip(&found)
+                    .filter_map(|((open, _), value)| Some((open.key.cell.to_string(), open.key.seed, (*value)?)))
                     .collect(),
             }
         });
-        let below = |pair: &&(&Report, &Report)| quantities.iter().all(|quantity| ratio(quantity, pair) < quantity.bar);
+        let below = |pair: &&(&Report, &Report)| {
+            quantities.iter().all(|quantity| ratio(quantity, pair).is_some_and(|ratio| ratio < quantity.bar))
+        };
         Some(Comparison {
             pairs: compared,
             stopped: compared - pairs.len(),
@@ -142,6 +146,14 @@ impl Comparison {
             all_below: share(pairs.iter().filter(below).count()),
         })
     }
+}
+
+/// Adaptation relative to open loop; `None` where open loop has nothing of the quantity, and adaptation has: there is no
+/// number for that, in JSON least of all.
+fn ratio(quantity: &Quantity, (open, adapted): &(&Report, &Report)) -> Option<f64> {
+    let [open, adapted] = [open, adapted].map(|report| (quantity.value)(&report.measures));
+    let ratio = if adapted > 0.0 { adapted / open } else { 0.0 };
+    Some(ratio).filter(|ratio| ratio.is_finite())
 }
 
 /// True if the hand touches in open loop what the comparison is about.
@@ -168,9 +180,14 @@ impl fmt::Display for Comparison {
                 (Some(median), Some(max)) => format!("median {median:.2}, largest {max:.2}"),
                 _ => "median not measured".to_owned(),
             };
+            let without = match ratio.without_ratio {
+                0 => String::new(),
+                1 => ", 1 with nothing of it in (a) left out".to_owned(),
+                n => format!(", {n} with nothing of it in (a) left out"),
+            };
             writeln!(
                 formatter,
-                "  {}: below {:.2} of (a) in {:.0} % of the pairs; {measured}",
+                "  {}: below {:.2} of (a) in {:.0} % of the pairs; {measured}{without}",
                 ratio.name,
                 ratio.bar,
                 100.0 * ratio.below,
@@ -243,6 +260,30 @@ mod tests {
         let ratio = &comparison.ratios[0];
         assert_eq!((ratio.median, ratio.max, ratio.medians), (None, None, [None, None]), "nothing was measured");
         assert!(comparison.to_string().contains("median not measured"), "{comparison}");
+    }
+
+    /// The change that makes it fail: the ratio to nothing is infinite, or 1e305, and `null` in JSON.
+    #[test]
+    fn a_pair_with_nothing_of_a_quantity_in_open_loop_has_no_ratio_and_is_above_the_bar() {
+        let mut results = fixtures::results(&[1]);
+        for report in &mut results.reports {
+            report.measures.push_m = 0.01;
+            let adapted = report.key.mode == Mode::Adaptive;
+            report.measures.contact_mean_n = match (report.key.index, adapted) {
+                (0 | 1, false) => Some(0.0),
+                (0, true) => Some(f64::MAX),
+                (1, true) => None,
+                _ => Some(4.0),
+            };
+        }
+        let comparison = Comparison::of(&results, Scenario::Cup).unwrap();
+        let contact = &comparison.ratios[1];
+        assert_eq!((contact.without_ratio, contact.trials.len(), contact.max), (1, 47, Some(1.0)));
+        assert!((contact.below - 1.0 / 48.0).abs() < 1e-12, "nothing in either is below the bar: {}", contact.below);
+        assert!(comparison.to_string().contains("1 with nothing of it in (a) left out"), "{comparison}");
+        let json = serde_json::to_value(&comparison).unwrap();
+        let ratios = json["ratios"][1]["trials"].as_array().unwrap();
+        assert!(ratios.iter().all(|trial| trial[2].is_f64()), "{json}");
     }
 
     #[test]
