@@ -63,6 +63,12 @@ pub enum CalibrationError {
         #[source]
         cause: WeighError,
     },
+    /// Figures are asked for, and what the arm weighs is not known any more.
+    #[error("the weight of arm {seed}, with which its trials were played, is not there any more")]
+    Lost {
+        /// The arm.
+        seed: u64,
+    },
 }
 
 impl Weighed {
@@ -106,6 +112,15 @@ impl Calibrated {
         let missing: Vec<u64> = config.seeds.iter().copied().filter(|seed| !self.arms.contains_key(seed)).collect();
         let weighed = in_parallel(config.jobs, &missing, |seed| weigh_arm(config, *seed, interrupt));
         self.keep(missing.into_iter().zip(weighed))
+    }
+
+    /// Checks that the arms with these seeds were weighed: for figures none is.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Lost`]
+    pub fn must_have(&self, seeds: &[u64]) -> Result<(), CalibrationError> {
+        let lost = seeds.iter().copied().find(|seed| !self.arms.contains_key(seed));
+        lost.map_or(Ok(()), |seed| Err(CalibrationError::Lost { seed }))
     }
 
     /// Keeps all that was found, behind an error too: each arm took its time. The first error is told.
@@ -192,6 +207,15 @@ mod tests {
         let found = [(1, Ok(weighed(None))), (2, Err("two")), (3, Ok(weighed(None))), (4, Err("four"))];
         assert_eq!(calibrated.keep(found.into_iter()), Err("two"));
         assert_eq!(calibrated.arms.keys().copied().collect::<Vec<_>>(), [1, 3]);
+    }
+
+    /// The change that makes it fail: arms of a file that is damaged count as none that are needed.
+    #[test]
+    fn figures_of_weighed_arms_need_their_weights() {
+        let mut calibrated = Calibrated::default();
+        assert!(matches!(calibrated.must_have(&[3]), Err(CalibrationError::Lost { seed: 3 })));
+        calibrated.arms.insert(3, weighed(None));
+        assert!(calibrated.must_have(&[3]).is_ok() && calibrated.must_have(&[3, 5]).is_err());
     }
 
     #[test]

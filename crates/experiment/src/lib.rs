@@ -57,7 +57,7 @@ pub use lab::procedure::Mode;
 pub use outcome::Outcome;
 pub use results::Results;
 #[cfg(feature = "mujoco")]
-pub use runner::{Experiment, ExperimentError, Progress, check, run};
+pub use runner::{Experiment, ExperimentError, Progress, check, run, there};
 pub use scenario::{PlantKind, Scenario};
 pub use statistics::Summary;
 pub use sweep::Sweep;

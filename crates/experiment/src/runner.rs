@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError, mpsc};
 use super::config::Config;
 use super::grid::Cell;
 use super::header::CODE;
-use super::log::{Log, ResultsError};
+use super::log::{LINES, Log, ResultsError};
 use super::reach;
 use super::results::{Key, Report, Results};
 use super::statistics::Summary;
@@ -197,6 +197,26 @@ pub fn run(
     Ok(Experiment { results, trials, prepared })
 }
 
+/// The results that are in the folder of an experiment, for whoever has to prepare something that takes long before
+/// [`run`]; nothing is written.
+///
+/// # Errors
+/// [`ResultsError`] with which [`run`] would refuse them.
+pub fn there(config: &Config) -> Result<Results, ResultsError> {
+    let Some(folder) = config.out.as_deref().filter(|folder| Log::must_exist(folder).is_ok()) else {
+        return Ok(Results::default());
+    };
+    let mut header = config.header();
+    if config.as_it_is {
+        header.described.remove(CODE);
+    }
+    let reports = Log::read(folder, &header)?;
+    if !reports.is_empty() && !config.resume && !config.as_it_is {
+        return Err(ResultsError::Exists { file: folder.join(LINES), trials: reports.len() });
+    }
+    Ok(Results::new(reports))
+}
+
 /// The log of results in the folder of an experiment, and what it holds; none without a folder.
 fn opened(config: &Config) -> Result<(Option<Log>, Vec<Report>), ExperimentError> {
     let Some(folder) = config.out.as_deref() else { return Ok((None, Vec::new())) };
@@ -236,10 +256,11 @@ fn of_what_is_there(
     Ok(Experiment { results, trials, prepared })
 }
 
-/// Writes a trial into the log of results, and its telemetry where recordings are kept.
+/// Writes the telemetry of a trial where recordings are kept, and then the trial into the log of results: what is in
+/// the log is not tried again, and would never get its recording.
 fn keep(config: &Config, log: Option<&mut Log>, trial: &Trial) -> Result<(), ExperimentError> {
-    log.map_or(Ok(()), |log| log.add(&trial.report))?;
-    config.out.as_deref().filter(|_| config.keep_recordings).map_or(Ok(()), |folder| record(folder, trial))
+    config.out.as_deref().filter(|_| config.keep_recordings).map_or(Ok(()), |folder| record(folder, trial))?;
+    log.map_or(Ok(()), |log| log.add(&trial.report).map_err(ExperimentError::from))
 }
 
 /// Repeats the trials of the representative cell that have left no trace because their results were there from before:
@@ -304,24 +325,78 @@ fn record(folder: &Path, trial: &Trial) -> Result<(), ExperimentError> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
     use std::path::Path;
 
+    use control::Payload;
+    use control::model::WeightCorrection;
     use lab::demonstration::Recording;
     use lab::learn::{LearnOptions, learn};
+    use sim::world::mujoco::Scene;
 
     use super::*;
     use crate::fixtures;
+    use crate::observation::Milestones;
     use crate::scenario::Scenario;
+
+    fn config() -> Config {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/reach.csv");
+        let recording = Recording::read(&file).unwrap();
+        let primitive = learn(&recording, Path::new("reach.toml"), &LearnOptions::named("reach")).unwrap().primitive;
+        Config::new(Scenario::Flashlight, primitive)
+    }
+
+    /// The change that makes it fail: what `run` would refuse is not looked at before arms are weighed for it.
+    #[test]
+    fn results_that_cannot_be_gone_on_with_are_refused_before_anything_is_prepared() {
+        let folder = tempfile::tempdir().unwrap();
+        let config = Config { out: Some(folder.path().to_owned()), ..config() };
+        assert_eq!(there(&config).unwrap(), Results::default());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written");
+        let (mut log, _) = Log::open(folder.path(), &config.header(), false).unwrap();
+        assert_eq!(there(&config).unwrap(), Results::default());
+        let report = &fixtures::results(&[1]).reports[0];
+        log.add(report).unwrap();
+        assert!(matches!(there(&config), Err(ResultsError::Exists { trials: 1, .. })));
+        for config in [Config { resume: true, ..config.clone() }, Config { as_it_is: true, ..config.clone() }] {
+            assert_eq!(there(&config).unwrap().reports, std::slice::from_ref(report));
+        }
+        let weights = BTreeMap::from([(1, WeightCorrection::none(Payload::SensorAndHand))]);
+        let weighed = there(&Config { weights, resume: true, ..config });
+        assert!(matches!(weighed, Err(ResultsError::OtherConfiguration { .. })), "{weighed:?}");
+    }
+
+    /// A full disk, or a file in the place of the folder: the trial is tried again, and has its recording then.
+    ///
+    /// The change that makes it fail: the line in the log comes first.
+    #[test]
+    fn a_trial_whose_recording_cannot_be_kept_is_not_in_the_log() {
+        let folder = tempfile::tempdir().unwrap();
+        let config = Config { out: Some(folder.path().to_owned()), keep_recordings: true, ..config() };
+        std::fs::write(folder.path().join("recordings"), "").unwrap();
+        let trial = Trial {
+            report: fixtures::results(&[1]).reports[0].clone(),
+            trace: Default::default(),
+            telemetry: Vec::new(),
+            observation: Default::default(),
+            snapshots: Vec::new(),
+            scene: Scene::EMPTY,
+            marks: Milestones { run: 0.0, lift: 0.0, hold: 0.0 },
+        };
+        let (mut log, _) = Log::open(folder.path(), &config.header(), false).unwrap();
+        let kept = keep(&config, Some(&mut log), &trial);
+        assert!(matches!(kept, Err(ExperimentError::File { .. })), "{kept:?}");
+        drop(log);
+        let (_log, reports) = Log::open(folder.path(), &config.header(), true).unwrap();
+        assert_eq!(reports, []);
+    }
 
     /// All trials were through, and the experiment ended as if one of them could not be carried through.
     ///
     /// The change that makes it fail: whatever ends a repeated trial is a failure of it.
     #[test]
     fn who_interrupts_the_repetition_for_a_figure_is_told_what_is_kept() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/reach.csv");
-        let recording = Recording::read(&file).unwrap();
-        let primitive = learn(&recording, Path::new("reach.toml"), &LearnOptions::named("reach")).unwrap().primitive;
-        let config = Config::new(Scenario::Flashlight, primitive);
+        let config = config();
         let (prepared, results) = (Prepared::of(&config).unwrap(), fixtures::results(&[1]));
         let interrupt = Interrupt::never();
         interrupt.raise();

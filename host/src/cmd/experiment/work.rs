@@ -1,14 +1,15 @@
 //! The experiments themselves: a primitive, its trials, and what they say together.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::failures::{failure, preparation_failure, trial_failure, unwritable};
-use super::refusal::DOING;
+use super::refusal::{self, DOING, REFUSED};
 use super::setup::{chosen, configuration};
 use super::{Cmd, ErrorCode, Failure, Global, Lifted, Studied, Tried};
 use crate::cmd::{Output, connection, files, upload};
+use control::Payload;
 use control::model::WeightCorrection;
 use experiment::calibrated::{Calibrated, CalibrationError};
 use experiment::lift::{self, Case};
@@ -26,7 +27,7 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     }
     let mut config = configuration(command, global, &out, 1, &interrupt, output)?;
     if command.calibrated || chosen(command, &out)?.weighed {
-        config.weights = calibrate(&config, &out, &interrupt, output)?;
+        config.weights = calibrate(command, &config, &out, &interrupt, output)?;
     }
     if config.scenario == Scenario::Lift {
         return lift(command, &config, &interrupt, output);
@@ -36,28 +37,70 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     output.result(&data, text)
 }
 
-/// Weighs the arms that were not weighed here before; their weights by seed.
+/// Weighs the arms that were not weighed here before; their weights by seed. For figures none is weighed.
 fn calibrate(
+    command: &Cmd,
     config: &Config,
     out: &Path,
     interrupt: &Interrupt,
     output: Output,
 ) -> Result<BTreeMap<u64, WeightCorrection>, Failure> {
     let file = out.join("calibrated.json");
+    // What is refused is refused before minutes of weighing, and before their result takes the place of another.
+    let seeds = seeds_there(command, config)?;
     let mut calibrated = Calibrated::read(&file, config);
-    let spinner = output.spinner("weighing the arms");
-    let completed = calibrated.complete(config, interrupt);
-    spinner.finish_and_clear();
-    // The arms that were weighed are worth keeping, whatever became of the others.
-    let data =
-        serde_json::to_value(&calibrated).map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
-    save(&file, &data)?;
-    completed.map_err(|error| match error {
+    let found = if command.figures_only {
+        calibrated.must_have(&seeds)
+    } else {
+        let spinner = output.spinner("weighing the arms");
+        let completed = calibrated.complete(config, interrupt);
+        spinner.finish_and_clear();
+        // The arms that were weighed are worth keeping, whatever became of the others.
+        let data = serde_json::to_value(&calibrated)
+            .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
+        save(&file, &data)?;
+        completed
+    };
+    found.map_err(|error| match error {
         CalibrationError::Tour { cause, .. } => trial_failure(cause),
         CalibrationError::Regression { .. } => Failure::new(ErrorCode::WeightNotAccepted, DOING, error),
+        CalibrationError::Lost { .. } => {
+            let cause = format!("{}: {error}", file.display());
+            Failure::new(ErrorCode::ResultsDamaged, REFUSED, cause)
+                .help("the experiment with `--calibrated --resume` weighs its arms anew; its trials are kept")
+        }
     })?;
     output.say(calibrated.table().to_string());
     calibrated.weights().map_err(|error| Failure::new(ErrorCode::WeightNotAccepted, DOING, error))
+}
+
+/// The seeds of the results that are there and asked for. Results that could not be gone on with are refused.
+fn seeds_there(command: &Cmd, config: &Config) -> Result<Vec<u64>, Failure> {
+    // Which weights it will be counts for nothing: the results tell only that their arms were weighed.
+    let none = WeightCorrection::none(Payload::SensorAndHand);
+    let mut parts = vec![Config { weights: BTreeMap::from([(0, none)]), ..config.clone() }];
+    if config.scenario == Scenario::Lift {
+        let weighed = parts.remove(0);
+        for case in Case::ALL {
+            let shared = rehearsed_file(config, case);
+            if shared.is_file() {
+                parts.push(case.config(&weighed, upload::read(&shared, DOING)?));
+            }
+        }
+    }
+    let mut seeds = Vec::new();
+    for part in &parts {
+        let there = experiment::there(part).map_err(|error| refusal::of(error, command))?;
+        seeds.extend(there.seeds());
+    }
+    seeds.retain(|seed| config.seeds.is_empty() || config.seeds.contains(seed));
+    Ok(seeds)
+}
+
+/// File of the primitive that is rehearsed for a case of the experiment with a weight.
+fn rehearsed_file(config: &Config, case: Case) -> PathBuf {
+    let out = config.out.clone().unwrap_or_default();
+    out.join(format!("{}-{}.toml", config.scenario, case.rehearsed_as().name()))
 }
 
 /// Several demonstrations, or several plants, or both: one experiment for each, and what they say together.
@@ -143,7 +186,7 @@ fn lift(command: &Cmd, config: &Config, interrupt: &Interrupt, output: Output) -
     let mut texts = Vec::new();
     let usual = config.variation.mass;
     for case in Case::ALL {
-        let shared = out.join(format!("{}-{}.toml", config.scenario, case.rehearsed_as().name()));
+        let shared = rehearsed_file(config, case);
         let primitive = if shared.is_file() {
             upload::read(&shared, DOING)?
         } else {
