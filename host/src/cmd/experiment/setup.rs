@@ -1,5 +1,6 @@
 //! The configuration of an experiment from the options of the command, with a primitive that is made if there is none.
 
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use super::failures::{failure, preparation_failure};
@@ -240,6 +241,14 @@ fn primitive(
         must_be_the_one_there(&primitive, &file)?;
         return Ok(primitive);
     }
+    if command.figures_only && !file.is_file() {
+        let cause = format!("{} is not there", file.display());
+        return Err(Failure::new(ErrorCode::NoResults, REFUSED, cause)
+            .help("name the primitive that was tried with `--primitive`, or the folder with `--out`"));
+    }
+    let is_new = !out.exists();
+    // A folder that cannot be had is told before the minutes of teaching.
+    let _kept = if command.figures_only { None } else { kept(out)? };
     if file.is_file() {
         output.say(format!("the primitive is {}", file.display()));
         let primitive = upload::read(&file, DOING)?;
@@ -252,14 +261,6 @@ fn primitive(
         spinner.finish_and_clear();
         return watched.map_err(preparation_failure);
     }
-    if command.figures_only {
-        let cause = format!("{} is not there", file.display());
-        return Err(Failure::new(ErrorCode::NoResults, REFUSED, cause)
-            .help("name the primitive that was tried with `--primitive`, or the folder with `--out`"));
-    }
-    let is_new = !out.exists();
-    // A folder that cannot be had is told before the minutes of teaching.
-    files::create_folder(out, DOING)?;
     let teaching = Teaching { scenario: command.scenario, plant, speed: command.learn_speed, number };
     let made = taught(command, teaching, &file, interrupt, output);
     if is_new && made.is_err() {
@@ -269,6 +270,22 @@ fn primitive(
     let primitive = made.map_err(preparation_failure)?;
     output.say(format!("taught, learned and rehearsed: {}", file.display()));
     Ok(primitive)
+}
+
+/// Makes the folder, and keeps it for this program until the file is closed: of two that make a primitive in it, the
+/// second would replace that of the first, with which trials may have begun. A file system without locks keeps nothing.
+fn kept(out: &Path) -> Result<Option<File>, Failure> {
+    files::create_folder(out, DOING)?;
+    let Ok(folder) = File::open(out) else { return Ok(None) };
+    match folder.try_lock() {
+        Ok(()) => Ok(Some(folder)),
+        Err(TryLockError::Error(_)) => Ok(None),
+        Err(TryLockError::WouldBlock) => {
+            let cause = format!("another experiment makes its primitive in {}", out.display());
+            Err(Failure::new(ErrorCode::FileFailed, REFUSED, cause)
+                .help("wait for the other experiment in this folder, or choose another one with `--out`"))
+        }
+    }
 }
 
 /// A new primitive, written into `file`.
