@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::{ErrorCode, Failure, Global, Output, files};
 use lab::demonstration::{Demonstration, Preparation, Recording};
+use lab::learn::SPEEDS;
 use lab::output_file::{self, OutputFile};
 use lab::plan;
 use lab::plot::{self, Movement, movement::PosePath};
@@ -98,7 +99,7 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         .unwrap_or_default();
     let movement = Movement {
         name,
-        demonstration: demonstration.as_ref().map(|demonstration| aligned(demonstration, learned)),
+        demonstration: demonstration.as_ref().map(|shown| aligned(shown, learned, execution.as_ref())),
         plan,
         execution: execution.map(|recording| if tracking.is_some() { recording.running() } else { recording }),
     };
@@ -155,13 +156,18 @@ pub struct Drawn {
     pub tracking: Option<Tracking>,
 }
 
-/// The demonstration in the time of the primitive that was learned from it, however much of its beginning each leaves
-/// out: otherwise the curves of a good primitive lie beside one another.
-fn aligned(demonstration: &Demonstration, learned: Option<&Provenance>) -> PosePath {
+/// The demonstration in the time of the primitive that was learned from it, and of its run: however much of its beginning
+/// each leaves out, however much faster than shown it was learned, and at whichever speed it was played. Otherwise the
+/// curves of a good primitive lie beside one another.
+fn aligned(demonstration: &Demonstration, learned: Option<&Provenance>, run: Option<&Recording>) -> PosePath {
     let mut path = PosePath::of_demonstration(demonstration);
     if let Some(from) = learned {
         let [before, _] = from.trimmed;
-        path.time.iter_mut().for_each(|time| *time += demonstration.trimmed.0 - before);
+        let played = run.filter(|run| run.origin.changes.is_none()).and_then(|run| run.origin.speed);
+        // Files may say anything of themselves.
+        let known = |speed: f64| if SPEEDS.contains(&speed) { speed } else { 1.0 };
+        let speed = known(from.speed) * known(played.unwrap_or(1.0));
+        path.time.iter_mut().for_each(|time| *time = (*time + demonstration.trimmed.0 - before) / speed);
     }
     path
 }
@@ -287,8 +293,21 @@ mod tests {
             left_out: (0.0, 0.0),
             pose_source: lab::demonstration::PoseSource::PoseColumns,
         };
-        assert_eq!(aligned(&demonstration, None).time[0], 0.0);
+        assert_eq!(aligned(&demonstration, None, None).time[0], 0.0);
         // Learned with `--no-trim`: its time counts from the first line of the recording.
-        assert_eq!(aligned(&demonstration, Some(&Provenance::default())).time[0], 0.75);
+        let mut learned = Provenance { speed: 1.0, ..Provenance::default() };
+        assert_eq!(aligned(&demonstration, Some(&learned), None).time[0], 0.75);
+        // Learned twice as fast as it was shown.
+        learned.speed = 2.0;
+        assert_eq!(aligned(&demonstration, Some(&learned), None).time[0], 0.375);
+        // And played at half the speed of that.
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/examples/reach.csv");
+        let mut run = Recording::read(&file).unwrap();
+        run.origin.speed = Some(0.5);
+        assert_eq!(aligned(&demonstration, Some(&learned), Some(&run)).time[0], 0.75);
+        run.origin.changes = Some("speed 2 at 3 s".to_owned());
+        assert_eq!(aligned(&demonstration, Some(&learned), Some(&run)).time[0], 0.375);
+        learned.speed = 0.0;
+        assert!(aligned(&demonstration, Some(&learned), None).time.iter().all(|time| time.is_finite()));
     }
 }

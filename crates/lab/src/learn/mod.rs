@@ -239,6 +239,7 @@ pub fn learn(recording: &Recording, file: &Path, options: &LearnOptions) -> Resu
         demonstration_checksum: recording.checksum,
         samples: demonstration.len(),
         trimmed: demonstration.trimmed.into(),
+        speed: options.speed,
         largest_angle,
         position_error: [report.position_max_m, report.position_rms_m],
         orientation_error: [report.orientation_max_rad, report.orientation_rms_rad],

@@ -153,6 +153,16 @@ pub struct StatisticsTable {
     pub spread: Vec<Vec<f64>>,
 }
 
+/// Speed of a movement that is learned as it was shown.
+fn as_shown() -> f64 {
+    1.0
+}
+
+/// True for that speed.
+fn is_as_shown(speed: &f64) -> bool {
+    *speed == as_shown()
+}
+
 /// Where a primitive comes from: not part of its content, not covered by the check sum.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -167,6 +177,9 @@ pub struct Provenance {
     /// Time cut off before and behind the movement, s.
     #[serde(rename = "trimmed_s")]
     pub trimmed: [f64; 2],
+    /// Speed of the movement, of the one that was shown; a file of one that is as fast does not have it.
+    #[serde(default = "as_shown", skip_serializing_if = "is_as_shown")]
+    pub speed: f64,
     /// Largest angle of the demonstration to its goal, rad.
     #[serde(rename = "largest_angle_rad")]
     pub largest_angle: f64,
