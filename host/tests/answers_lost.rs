@@ -46,7 +46,11 @@ fn carry(mut from: UnixStream, mut to: UnixStream, mut passes: impl FnMut(&[u8])
 }
 
 /// A command at the arm that is served in the folder, over a line that dies behind the answer to a request.
-fn broken_behind(folder: &Path, is_last: fn(&Request) -> bool, line: &str) -> std::process::Output {
+fn broken_behind(
+    folder: &Path,
+    mut is_last: impl FnMut(&Request) -> bool + Send + 'static,
+    line: &str,
+) -> std::process::Output {
     let place = folder.join("line.sock");
     let _ = std::fs::remove_file(&place);
     let listener = UnixListener::bind(&place).unwrap();
@@ -57,7 +61,7 @@ fn broken_behind(folder: &Path, is_last: fn(&Request) -> bool, line: &str) -> st
         let last = Arc::new(AtomicU32::new(NONE));
         let (seen, ends) = (Arc::clone(&last), [host.try_clone().unwrap(), device.try_clone().unwrap()]);
         std::thread::spawn(move || {
-            carry(host, device, |message| {
+            carry(host, device, move |message| {
                 if let Some((number, _)) = decoded::<Request>(message).filter(|(_, request)| is_last(request)) {
                     seen.store(number.into(), Ordering::SeqCst);
                 }
@@ -74,6 +78,10 @@ fn broken_behind(folder: &Path, is_last: fn(&Request) -> bool, line: &str) -> st
     command.env("TACTUS_DEVICE", "unix:line.sock").output().unwrap()
 }
 
+/// Faults of an arm to which nothing happens.
+const NOTHING: &str =
+    "[[scenario]]\nname = \"none\"\nfrom = \"power-up\"\ninject = [{ at = 1000, lasts = 0.1, what.payload = 0 }]\n";
+
 /// The device kept the home, and the report said that it did not, because a question behind that had no answer.
 ///
 /// The change that makes it fail: the status behind it is asked for with `?`.
@@ -81,10 +89,7 @@ fn broken_behind(folder: &Path, is_last: fn(&Request) -> bool, line: &str) -> st
 fn a_home_that_the_device_keeps_is_told_as_kept_whatever_becomes_of_the_line_then() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let _arm = Arm::start(
-        at,
-        "[[scenario]]\nname = \"none\"\nfrom = \"power-up\"\ninject = [{ at = 1000, lasts = 0.1, what.payload = 0 }]\n",
-    );
+    let _arm = Arm::start(at, NOTHING);
     let line = "--non-interactive calibrate home --set 0.02,-1.97,0.01,3.1,0,0.03,-0.05 --report found.json";
     let output = broken_behind(at, |request| matches!(request, Request::Calibrate { .. }), line);
     let report: Value = serde_json::from_slice(&std::fs::read(at.join("found.json")).unwrap()).unwrap();
@@ -95,4 +100,48 @@ fn a_home_that_the_device_keeps_is_told_as_kept_whatever_becomes_of_the_line_the
     let told = crate::served_arm::tactus(at, "--json calibrate show");
     let told: Value = serde_json::from_slice(&told.stdout).unwrap();
     assert_eq!(told["stored"], true, "{told}");
+}
+
+/// The settings were kept and read back, and the command ended with E702 because it could not tell whether the arm counts
+/// from its old zero.
+///
+/// The change that makes it fail: the status behind them is asked for with `?`.
+#[test]
+fn settings_that_the_device_keeps_are_told_as_kept_whatever_becomes_of_the_line_then() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let _arm = Arm::start(at, NOTHING);
+    let mut is_written = false;
+    let read_back = move |request: &Request| {
+        is_written |= matches!(request, Request::Calibrate { .. });
+        is_written && matches!(request, Request::Weight)
+    };
+    let output = broken_behind(at, read_back, "--json config set home.joint_4_rad=3.1");
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let changes = told["changes"].as_array().unwrap();
+    let home = changes.iter().find(|change| change["key"] == "home.joint_4_rad");
+    assert_eq!(home.map(|change| &change["after"]), Some(&3.1.into()), "{told}");
+}
+
+/// Nobody told that the device asks for the secret from now on, or asks for none any more.
+///
+/// The changes that make it fail: what is to be said comes behind the proof, or behind the question what is kept.
+#[test]
+fn a_secret_that_the_device_keeps_or_forgets_is_told_whatever_becomes_of_the_line_then() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let _arm = Arm::start(at, NOTHING);
+    crate::tool::tactus(at, "secret new lab.secret");
+    let kept = |request: &Request| matches!(request, Request::KeepSecret { .. });
+    let output = broken_behind(at, kept, "secret set lab.secret");
+    assert_eq!(output.status.code(), Some(7), "{}", said(&output));
+    assert!(said(&output).contains("from now on: `--secret-file lab.secret`"), "{}", said(&output));
+    let told = crate::served_arm::tactus(at, "--json secret status");
+    let told: Value = serde_json::from_slice(&told.stdout).unwrap();
+    assert_eq!(told["secret"], "kept", "{told}");
+    let forgotten = |request: &Request| matches!(request, Request::ForgetSecret);
+    let output = broken_behind(at, forgotten, "--secret-file lab.secret secret clear");
+    assert_eq!(output.status.code(), Some(7), "{}", said(&output));
+    assert!(said(&output).contains("the device has forgotten the secret"), "{}", said(&output));
 }

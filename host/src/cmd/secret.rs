@@ -78,16 +78,18 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
                 .map_err(|error| connection::secret_failure(file, error, DOING))?;
             let mut client = connection::open_to_change_secret(global, DOING)?;
             client.keep_secret(&secret).map_err(failed)?;
-            client.unlock(&secret).map_err(failed)?;
+            // It is kept: whatever becomes of the line now, who commands the device has to name this file.
             let word = quoted::path(file);
             global.output().say(format!("from now on: `--secret-file {word}`, or TACTUS_SECRET_FILE={word}"));
             global.tell_forgotten();
+            client.unlock(&secret).map_err(failed)?;
             tell(&client.secret().map_err(failed)?, global)
         }
         Action::Clear => {
             let mut client = connection::open_to_change_secret(global, DOING)?;
             client.forget_secret().map_err(failed)?;
-            tell(&client.secret().map_err(failed)?, global)
+            let left = client.secret().inspect_err(|_| global.output().say("the device has forgotten the secret"));
+            tell(&left.map_err(failed)?, global)
         }
         Action::Status => tell(&connection::observe(global, DOING)?.secret().map_err(failed)?, global),
     }
