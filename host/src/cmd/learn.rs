@@ -39,20 +39,20 @@ pub struct Cmd {
     /// Name of the primitive on the device [default: name of the output file]
     #[arg(long)]
     pub name: Option<String>,
-    /// Kernels of each row
+    /// Kernels of each row, 2 to 100
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u16).range(2..=100))]
     pub kernels: u16,
-    /// Cut-off of the zero-phase filter on the demonstration, Hz
-    #[arg(long, default_value_t = CUTOFF, value_name = "HZ", allow_hyphen_values = true)]
+    /// Cut-off of the zero-phase filter on the demonstration, Hz, below 150
+    #[arg(long, default_value_t = CUTOFF, value_name = "HZ", value_parser = number, allow_hyphen_values = true)]
     pub cutoff: f64,
     /// Use the rotation vector as orientation error: for movements that turn more than 150 degrees
     #[arg(long)]
     pub rotation_vector: bool,
-    /// Speed below which the arm counts as still before and behind the movement, m/s
-    #[arg(long, default_value_t = STILL_SPEED, value_name = "M_PER_S", allow_hyphen_values = true)]
+    /// Speed below which the arm counts as still before and behind the movement, m/s, at most 1
+    #[arg(long, default_value_t = STILL_SPEED, value_name = "M_PER_S", value_parser = number, allow_hyphen_values = true)]
     pub still_speed: f64,
-    /// Speed of the movement that is learned, of the one that was shown; a dwell keeps its time
-    #[arg(long, default_value_t = 1.0, value_name = "FACTOR", allow_hyphen_values = true)]
+    /// Speed of the movement that is learned, of the one that was shown, 0.1 to 10; a dwell keeps its time
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR", value_parser = number, allow_hyphen_values = true)]
     pub speed: f64,
     /// Learn the whole recording, with the time in which the arm stands still
     #[arg(long, conflicts_with = "still_speed")]
@@ -63,17 +63,17 @@ pub struct Cmd {
     /// Hand at the end: spread and fingers 1 to 3, rad
     #[arg(long, value_name = "S,F1,F2,F3", default_value = "0,0,0,0", value_parser = hand, allow_hyphen_values = true)]
     pub hand_goal: [f64; 4],
-    /// Rest at the goal behind the movement, s: time for the fingers to close
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_hyphen_values = true)]
+    /// Rest at the goal behind the movement, at most 60 s: time for the fingers to close
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = number, allow_hyphen_values = true)]
     pub dwell: f64,
     /// Fractions of the duration, the dwell included, between which the fingers move [default: 0.6,1]
     #[arg(long, value_name = "BEGIN,END", value_parser = numbers::<2>, allow_hyphen_values = true)]
     pub hand_window: Option<[f64; 2]>,
     /// Spring K of the position [default: 400 for 12 s, growing with the square of the duration, at least 200]
-    #[arg(long, value_name = "K", allow_hyphen_values = true)]
+    #[arg(long, value_name = "K", value_parser = number, allow_hyphen_values = true)]
     pub stiffness: Option<f64>,
     /// Spring K of the orientation [default: 200 for 12 s, likewise]
-    #[arg(long, value_name = "K", allow_hyphen_values = true)]
+    #[arg(long, value_name = "K", value_parser = number, allow_hyphen_values = true)]
     pub orientation_stiffness: Option<f64>,
     /// Sensitivity K1 to forces (position, world axes) and torques (rotation, hand axes), optionally spread and fingers
     /// [default: 0.8 K in the horizontal, 3.7 K about the vertical at the goal, fingers 0.3 K]
@@ -269,6 +269,11 @@ fn hand(text: &str) -> Result<[f64; 4], String> {
     }
 }
 
+/// A number. Whoever writes a comma in it is told; the learner says which numbers will do.
+fn number(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| format!("`{text}` is not a number, such as 7.5 with a point"))
+}
+
 /// Numbers separated by commas.
 pub(super) fn numbers<const COUNT: usize>(text: &str) -> Result<[f64; COUNT], String> {
     let values: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
@@ -291,6 +296,22 @@ mod tests {
         assert_eq!(again("--force learn a.csv"), "tactus --force learn a.csv --no-trim");
         assert_eq!(again("--device learn learn -- -a.csv"), "tactus --device learn learn --no-trim -- -a.csv");
         assert_eq!(again_with(vec!["learn".to_owned(), "my a.csv".to_owned()], "-x"), "tactus learn 'my a.csv' -x");
+    }
+
+    /// The change that makes it fail: an option without a parser of its own, of which is told: invalid float literal.
+    #[test]
+    fn a_number_with_a_comma_is_told_to_have_none() {
+        #[derive(Debug, clap::Parser)]
+        struct Line {
+            #[command(flatten)]
+            command: Cmd,
+        }
+        for option in ["cutoff", "still-speed", "speed", "dwell", "stiffness", "orientation-stiffness"] {
+            let line = ["learn", "a.csv", &format!("--{option}"), "0,5"];
+            let told = <Line as clap::Parser>::try_parse_from(line).unwrap_err().to_string();
+            assert!(told.contains("`0,5` is not a number, such as 7.5 with a point"), "{option}: {told}");
+        }
+        assert_eq!(number("0.5"), Ok(0.5));
     }
 
     #[test]

@@ -509,6 +509,32 @@ mod tests {
         }
     }
 
+    /// The change that makes it fail: a limit that only the refusal tells.
+    #[test]
+    fn options_tell_the_limits_of_their_numbers() {
+        let mut all = Cli::command().term_width(400);
+        all.build();
+        for (command, option, limit) in [
+            ("learn", "--kernels", "2 to 100"),
+            ("learn", "--cutoff", "Hz, below 150"),
+            ("learn", "--still-speed", "m/s, at most 1"),
+            ("learn", "--speed", "0.1 to 10"),
+            ("learn", "--dwell", "at most 60 s"),
+            ("rehearse", "--trials", "1 to 50"),
+            ("rehearse", "--payload", "at most 4 kg"),
+            ("rehearse", "--speed", "0.1 to 2"),
+            ("run", "--speed", "0.1 to 2"),
+            ("record", "--duration", "0.2 to 3600 s"),
+            ("teach", "--duration", "0.2 to 3600 s"),
+            ("monitor", "--duration", "at most 3600 s"),
+            ("sim", "--duration", "at most 3600 s"),
+        ] {
+            let help = all.find_subcommand_mut(command).unwrap().render_help().to_string();
+            let told = help.split_once(&format!("{option} <")).unwrap().1;
+            assert!(told.lines().take(2).any(|line| line.contains(limit)), "{command} {option}: {limit}\n{told}");
+        }
+    }
+
     #[test]
     fn experiments_name_modes_by_letter_and_runs_by_word() {
         let parse = |line: &str| Cli::try_parse_from(line.split(' ')).map(|cli| cli.command);

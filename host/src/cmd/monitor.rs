@@ -38,7 +38,7 @@ pub struct Cmd {
     /// The primitive that runs, TOML: the wrench that it expects is shown beside the measured one
     #[arg(long, short, value_name = "PRIMITIVE")]
     pub primitive: Option<PathBuf>,
-    /// End after this time, s
+    /// End after this time, at most 3600 s
     #[arg(long, value_name = "SECONDS", value_parser = teach::duration, allow_hyphen_values = true)]
     pub duration: Option<f64>,
 }

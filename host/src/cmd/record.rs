@@ -17,7 +17,7 @@ pub struct Cmd {
     /// Where the recording goes, CSV (see docs/recording-format.md)
     #[arg(long, short, value_name = "FILE", default_value = "recording.csv")]
     pub output: PathBuf,
-    /// Duration, s
+    /// Duration, 0.2 to 3600 s
     #[arg(
         long,
         value_name = "SECONDS",

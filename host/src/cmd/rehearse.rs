@@ -33,7 +33,7 @@ pub struct Cmd {
     /// The primitive, TOML
     #[arg(value_name = "PRIMITIVE")]
     pub primitive: PathBuf,
-    /// Repetitions; from 3 on the spread weighs the sensors (K2)
+    /// Repetitions, 1 to 50; from 3 on the spread weighs the sensors (K2)
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=50))]
     pub trials: u8,
     /// Speed relative to the taught one, 0.1 to 2
@@ -45,7 +45,7 @@ pub struct Cmd {
     /// Keep the recordings in this folder, as NAME-1.csv and so on
     #[arg(long, value_name = "FOLDER")]
     pub record_dir: Option<PathBuf>,
-    /// Load in the hand from the beginning: its mass, and its centre in the tool frame
+    /// Load in the hand from the beginning: its mass, at most 4 kg, and its centre in the tool frame, m
     #[arg(long, value_name = "KG[,X,Y,Z]", value_parser = payload, allow_hyphen_values = true)]
     pub payload: Option<Payload>,
     /// Leave all sensors the same weight (K2 = 1), whatever their spread

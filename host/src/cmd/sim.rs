@@ -43,7 +43,7 @@ pub struct Cmd {
     /// Where to listen: `unix:PATH` or `tcp:HOST:PORT`
     #[arg(long, value_name = "ADDRESS", default_value = "unix:tactus.sock")]
     pub listen: String,
-    /// End after this much virtual time, s
+    /// End after this much virtual time, at most 3600 s
     #[arg(long, value_name = "SECONDS", value_parser = super::teach::duration, allow_hyphen_values = true)]
     pub duration: Option<f64>,
     /// While nobody is connected, do not wait for the wall clock: run as fast as this machine can
