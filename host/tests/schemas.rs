@@ -23,3 +23,17 @@ fn cli_13_the_schema_files_are_those_of_the_types_and_nothing_else_is_there() {
     found.sort();
     assert_eq!(found, names);
 }
+
+/// The change that makes it fail: a quantity of a cycle that `faults` calls otherwise than `monitor`.
+#[test]
+fn a_cycle_of_a_fault_has_the_names_of_one_of_the_monitor() {
+    let names = |schema: &str, within: &str| -> Vec<String> {
+        let (_, schema) = tactus::schemas::all().into_iter().find(|(name, _)| *name == schema).unwrap();
+        let properties = schema.as_value().pointer(within).unwrap().as_object().unwrap();
+        properties.keys().cloned().collect()
+    };
+    let shown = names("monitor", "/$defs/Line/properties");
+    let kept = names("faults", "/$defs/Cycle/properties");
+    let others: Vec<&String> = kept.iter().filter(|name| !shown.contains(name)).collect();
+    assert_eq!(others, ["cost_ticks", "flags"], "only these are of the record alone");
+}

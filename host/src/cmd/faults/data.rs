@@ -74,10 +74,12 @@ pub struct Cycle {
     /// Joint angles, rad.
     pub q_rad: [f32; 7],
     /// Joint velocities, rad/s.
-    pub dq_rad_per_s: [f32; 7],
+    pub dq_rad_s: [f32; 7],
     /// Joint torques sent, N m.
+    #[serde(rename = "tau_Nm")]
     pub tau_nm: [f32; 7],
     /// Force of the environment on the robot (N, world axes) and torque (N m, hand axes).
+    #[serde(rename = "wrench_N_Nm")]
     pub wrench: [f32; 6],
     /// Spread and fingers F1 to F3, rad.
     pub hand_rad: [f32; 4],
@@ -147,7 +149,7 @@ impl Cycle {
             flags: cycle.flags,
             phase: cycle.phase,
             q_rad: cycle.q,
-            dq_rad_per_s: cycle.dq,
+            dq_rad_s: cycle.dq,
             tau_nm: cycle.tau,
             wrench: cycle.wrench,
             hand_rad: cycle.hand,
