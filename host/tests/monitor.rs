@@ -153,6 +153,18 @@ fn a_screen_that_is_too_small_says_so() {
     assert!(screen(&watch(), 200, 23).starts_with("80 x 24 are needed, here are 200 x 23"));
 }
 
+/// The change that makes it fail: a small screen tells its size alone, while its keys stop the arm as ever.
+#[test]
+fn a_screen_that_is_too_small_tells_the_state_of_the_arm_and_the_keys_that_stop_it() {
+    let mut watch = watch();
+    watch.answer(Status { fault: Fault::ContactForce.code(), ..Status::default() });
+    let small = screen(&watch, 40, 12);
+    let told = small.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains(&format!("state {}", watch.state().to_uppercase())), "{small}");
+    assert!(told.contains("s or space: stop the arm"), "{small}");
+    assert!(told.contains("the contact force passed the stop threshold"), "{small}");
+}
+
 #[test]
 fn what_is_not_known_is_null_for_a_script() {
     let idle = serde_json::to_value(watch().line()).unwrap();

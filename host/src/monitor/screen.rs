@@ -27,12 +27,18 @@ const GOOD: Style = Style::new().fg(Color::Green);
 const WARNING: Style = Style::new().fg(Color::Yellow);
 const BAD: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
 
+/// The keys that mean something.
+const KEYS: &str = " s or space: stop the arm   q: leave, the arm goes on ";
+
 /// Draws everything.
 pub fn draw(frame: &mut Frame<'_>, watch: &Watch) {
     let area = frame.area();
     if (area.width, area.height) < SMALLEST || area.height < SMALLEST.1 {
         let words = format!("{} x {} are needed, here are {} x {}", SMALLEST.0, SMALLEST.1, area.width, area.height);
-        return frame.render_widget(Paragraph::new(words), area);
+        // Whoever made the window small may need the keys, and the state of the arm, all the same.
+        let lines = [words, format!("state {}", watch.state().to_uppercase()), KEYS.to_owned(), watch.cause()];
+        let lines: Vec<Line<'_>> = lines.into_iter().map(Line::raw).collect();
+        return frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: true }), area);
     }
     // What to do stands at the end of a cause: a long one takes the line of the newest event, which says the same.
     let cause = watch.cause();
@@ -59,7 +65,7 @@ pub fn draw(frame: &mut Frame<'_>, watch: &Watch) {
     let newest = watch.events.iter().rev().take(usize::from(events.height)).collect::<Vec<_>>();
     let lines: Vec<Line<'_>> = newest.into_iter().rev().map(|event| Line::raw(event.as_str())).collect();
     frame.render_widget(Paragraph::new(lines), events);
-    let help = Line::styled(" s or space: stop the arm   q: leave, the arm goes on ", Modifier::REVERSED);
+    let help = Line::styled(KEYS, Modifier::REVERSED);
     frame.render_widget(Paragraph::new(help), keys);
 }
 
