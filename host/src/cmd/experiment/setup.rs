@@ -331,3 +331,21 @@ fn with_statistics(
     primitive.write(file)?;
     Ok(primitive)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The change that makes it fail: the folder is made and not kept.
+    #[test]
+    fn a_folder_in_which_a_primitive_is_made_is_refused_to_another_experiment() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("cup");
+        let first = kept(&out).unwrap();
+        let refused = kept(&out).unwrap_err();
+        assert_eq!(refused.code.to_string(), "E236");
+        assert!(refused.to_string().contains("another experiment makes its primitive in"), "{refused}");
+        drop(first);
+        assert!(kept(&out).is_ok(), "it is free again");
+    }
+}

@@ -55,10 +55,13 @@ fn calibrate(
         let spinner = output.spinner("weighing the arms");
         let completed = calibrated.complete(config, interrupt);
         spinner.finish_and_clear();
-        // The arms that were weighed are worth keeping, whatever became of the others.
-        let data = serde_json::to_value(&calibrated)
-            .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
-        save(&file, &data)?;
+        // The arms that were weighed are worth keeping, whatever became of the others. Where none was, the file may hold
+        // those of another plant.
+        if !calibrated.arms.is_empty() {
+            let data = serde_json::to_value(&calibrated)
+                .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
+            save(&file, &data)?;
+        }
         completed
     };
     found.map_err(|error| match error {
@@ -265,4 +268,82 @@ fn save(file: &Path, data: &impl serde::Serialize) -> Result<(), Failure> {
     let text =
         serde_json::to_string_pretty(data).map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
     output_file::replace(file, text.as_bytes()).map_err(|cause| unwritable(file, cause))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use experiment::results::{Key, Report};
+    use experiment::{Cell, Mode, Outcome};
+    use lab::demonstration::Recording;
+    use lab::learn::{LearnOptions, learn};
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        command: Cmd,
+    }
+
+    fn config(out: &Path) -> Config {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/examples/reach.csv");
+        let recording = Recording::read(&file).unwrap();
+        let primitive = learn(&recording, Path::new("reach.toml"), &LearnOptions::named("reach")).unwrap().primitive;
+        Config { out: Some(out.to_owned()), ..Config::new(Scenario::Flashlight, primitive) }
+    }
+
+    /// The code with which weights are refused, of results whose arms `are_weighed`; their file stays as it is.
+    #[track_caller]
+    fn refused(line: &str, are_weighed: bool, trials: Option<&str>) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let (out, file) = (folder.path(), folder.path().join("calibrated.json"));
+        std::fs::write(&file, "minutes of weighing").unwrap();
+        let command = Line::try_parse_from(line.split(' ')).unwrap().command;
+        let mut config = config(out);
+        if are_weighed {
+            config.weights = BTreeMap::from([(7, WeightCorrection::none(Payload::SensorAndHand))]);
+        }
+        if let Some(trials) = trials {
+            let header = serde_json::to_string(&config.header()).unwrap();
+            std::fs::write(out.join("results.jsonl"), format!("{header}\n{trials}")).unwrap();
+        }
+        (config.resume, config.as_it_is, config.weights) = (command.resume, command.figures_only, BTreeMap::new());
+        config.seeds = if command.figures_only { vec![] } else { vec![1] };
+        let interrupt = Interrupt::never();
+        // Should it come to a weighing, that ends at once.
+        interrupt.raise();
+        let outcome = calibrate(&command, &config, out, &interrupt, Output { quiet: true, ..Output::default() });
+        assert_eq!(std::fs::read(&file).unwrap(), b"minutes of weighing", "{outcome:?}");
+        outcome.unwrap_err().code.to_string()
+    }
+
+    /// The arms were weighed for minutes, their file took the place of the one that was there, and then the experiment was
+    /// refused; the figures of a damaged file replaced it by an empty one.
+    ///
+    /// The changes that make it fail: `calibrate` without `seeds_there`, or figures that weigh.
+    #[test]
+    fn what_cannot_be_gone_on_with_is_refused_before_arms_are_weighed_and_figures_weigh_none() {
+        assert_eq!(refused("experiment flashlight --calibrated --resume", false, Some("")), "E404");
+        let report = Report {
+            key: Key { index: 0, cell: Cell::default(), mode: Mode::OpenLoop, seed: 1 },
+            trial_seed: 1,
+            object: [0.0; 2],
+            outcome: Outcome::Held,
+            measures: Default::default(),
+            adaptation_m: 0.0,
+            adaptation_deg: 0.0,
+            sag_m: None,
+            free_sag_m: None,
+            surprise: None,
+            path: Default::default(),
+            virtual_s: 1.0,
+            wall_s: None,
+        };
+        let report = format!("{}\n", serde_json::to_string(&report).unwrap());
+        assert_eq!(refused("experiment flashlight --calibrated", true, Some(&report)), "E207");
+        assert_eq!(refused("experiment flashlight --figures-only", true, Some(&report)), "E661");
+        // Interrupted before the first arm was weighed.
+        assert_eq!(refused("experiment flashlight --calibrated", false, None), "E130");
+    }
 }
