@@ -102,8 +102,8 @@ fn a_home_that_the_device_keeps_is_told_as_kept_whatever_becomes_of_the_line_the
     assert_eq!(told["stored"], true, "{told}");
 }
 
-/// The settings were kept and read back, and the command ended with E702 because it could not tell whether the arm counts
-/// from its old zero.
+/// The settings were kept and read back, and the command ended with E702 because it could not tell whether the arm
+/// counts from its old zero.
 ///
 /// The change that makes it fail: the status behind them is asked for with `?`.
 #[test]

@@ -148,8 +148,8 @@ impl Comparison {
     }
 }
 
-/// Adaptation relative to open loop; `None` where open loop has nothing of the quantity, and adaptation has: there is no
-/// number for that, in JSON least of all.
+/// Adaptation relative to open loop; `None` where open loop has nothing of the quantity, and adaptation has: there is
+/// no number for that, in JSON least of all.
 fn ratio(quantity: &Quantity, (open, adapted): &(&Report, &Report)) -> Option<f64> {
     let [open, adapted] = [open, adapted].map(|report| (quantity.value)(&report.measures));
     let ratio = if adapted > 0.0 { adapted / open } else { 0.0 };

@@ -156,9 +156,9 @@ pub struct Drawn {
     pub tracking: Option<Tracking>,
 }
 
-/// The demonstration in the time of the primitive that was learned from it, and of its run: however much of its beginning
-/// each leaves out, however much faster than shown it was learned, and at whichever speed it was played. Otherwise the
-/// curves of a good primitive lie beside one another.
+/// The demonstration in the time of the primitive that was learned from it, and of its run: however much of its
+/// beginning each leaves out, however much faster than shown it was learned, and at whichever speed it was played.
+/// Otherwise the curves of a good primitive lie beside one another.
 fn aligned(demonstration: &Demonstration, learned: Option<&Provenance>, run: Option<&Recording>) -> PosePath {
     let mut path = PosePath::of_demonstration(demonstration);
     if let Some(from) = learned {

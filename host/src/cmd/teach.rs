@@ -34,7 +34,8 @@ pub struct Cmd {
     /// Posture the arm moves to before it becomes weightless: seven joint angles, rad. A simulated arm has a default
     #[arg(long, value_name = "Q1,...,Q7", value_parser = start_posture, allow_hyphen_values = true)]
     pub from: Option<Posture>,
-    /// Duration of the recording, 0.2 to 3600 s. Without it: until Enter is pressed, at most 120, or a simulated teacher lets go
+    /// Duration of the recording, 0.2 to 3600 s. Without it: until Enter is pressed, at most 120, or a simulated
+    /// teacher lets go
     #[arg(long, value_name = "SECONDS", value_parser = recorded, allow_hyphen_values = true)]
     pub duration: Option<f64>,
     /// I have brought the arm to its home pose: zero it there if need be

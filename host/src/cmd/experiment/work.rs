@@ -55,8 +55,8 @@ fn calibrate(
         let spinner = output.spinner("weighing the arms");
         let completed = calibrated.complete(config, interrupt);
         spinner.finish_and_clear();
-        // The arms that were weighed are worth keeping, whatever became of the others. Where none was, the file may hold
-        // those of another plant.
+        // The arms that were weighed are worth keeping, whatever became of the others. Where none was, the file may
+        // hold those of another plant.
         if !calibrated.arms.is_empty() {
             let data = serde_json::to_value(&calibrated)
                 .map_err(|cause| Failure::new(ErrorCode::ResultNotWritten, DOING, cause))?;
@@ -318,8 +318,8 @@ mod tests {
         outcome.unwrap_err().code.to_string()
     }
 
-    /// The arms were weighed for minutes, their file took the place of the one that was there, and then the experiment was
-    /// refused; the figures of a damaged file replaced it by an empty one.
+    /// The arms were weighed for minutes, their file took the place of the one that was there, and then the experiment
+    /// was refused; the figures of a damaged file replaced it by an empty one.
     ///
     /// The changes that make it fail: `calibrate` without `seeds_there`, or figures that weigh.
     #[test]
