@@ -37,3 +37,31 @@ fn a_cycle_of_a_fault_has_the_names_of_one_of_the_monitor() {
     let others: Vec<&String> = kept.iter().filter(|name| !shown.contains(name)).collect();
     assert_eq!(others, ["cost_ticks", "flags"], "only these are of the record alone");
 }
+
+/// The change that makes it fail: a quantity that two commands call by the same words in another order.
+#[test]
+fn no_quantity_has_two_names_of_the_same_words() {
+    fn collect(value: &serde_json::Value, names: &mut Vec<String>) {
+        let properties = value.get("properties").and_then(serde_json::Value::as_object);
+        names.extend(properties.into_iter().flat_map(|properties| properties.keys().cloned()));
+        let inner: Vec<&serde_json::Value> = match value {
+            serde_json::Value::Object(object) => object.values().collect(),
+            serde_json::Value::Array(values) => values.iter().collect(),
+            _ => Vec::new(),
+        };
+        inner.into_iter().for_each(|value| collect(value, names));
+    }
+    let mut names = Vec::new();
+    tactus::schemas::all().iter().for_each(|(_, schema)| collect(schema.as_value(), &mut names));
+    names.sort();
+    names.dedup();
+    let words = |name: &String| {
+        let mut words: Vec<&str> = name.split('_').collect();
+        words.sort_unstable();
+        words.join(" ")
+    };
+    let mut of_words: std::collections::BTreeMap<String, Vec<&String>> = std::collections::BTreeMap::new();
+    names.iter().for_each(|name| of_words.entry(words(name)).or_default().push(name));
+    of_words.retain(|_, names| names.len() > 1);
+    assert!(names.len() > 100 && of_words.is_empty(), "{of_words:?}");
+}

@@ -87,7 +87,7 @@ pub struct LineHealth {
     /// Messages of the device that did not arrive here.
     pub lost_messages: u32,
     /// Telemetry that the device left out because the line was full.
-    pub dropped_telemetry: u32,
+    pub telemetry_dropped: u32,
     /// Replies of arm and sensor that did not come in their cycle.
     pub lost_replies: u32,
     /// Replies that came after their cycle.
@@ -130,7 +130,7 @@ impl LineHealth {
             answer_max_ms: share(1.0),
             repeated_requests: after.repeated.wrapping_sub(before.repeated),
             lost_messages: after.gaps.messages.wrapping_sub(before.gaps.messages),
-            dropped_telemetry: since(|counters| counters.telemetry_dropped),
+            telemetry_dropped: since(|counters| counters.telemetry_dropped),
             lost_replies: since(|counters| counters.lost_replies),
             late_replies: since(|counters| counters.late_replies),
             missed_deadlines: since(|counters| counters.missed_deadlines),
@@ -141,11 +141,11 @@ impl LineHealth {
             late: Vec::new(),
         };
         let timeouts = since(|counters| counters.link_timeouts);
-        let LineHealth { lost_messages, repeated_requests, dropped_telemetry, .. } = health;
+        let LineHealth { lost_messages, repeated_requests, telemetry_dropped, .. } = health;
         health.late = [
             (health.lost_replies + health.late_replies > 0, "the arm's bus: replies missing or late"),
             (health.missed_deadlines > 0, "the device: deadlines missed"),
-            (lost_messages + repeated_requests + dropped_telemetry > 0, "the line to the host: messages lost"),
+            (lost_messages + repeated_requests + telemetry_dropped > 0, "the line to the host: messages lost"),
             (timeouts > 0, "the host: it fell silent"),
         ]
         .into_iter()
@@ -175,7 +175,7 @@ impl LineHealth {
             ("complete cycles, all", percent(self.success_rate)),
             ("longest gap", or(self.longest_gap_ms.map(|gap| format!("{gap:.1} ms")))),
             ("answers: half, 99 %, slowest", answers),
-            ("messages lost, left out", format!("{}, {}", self.lost_messages, self.dropped_telemetry)),
+            ("messages lost, left out", format!("{}, {}", self.lost_messages, self.telemetry_dropped)),
             ("replies lost, late", format!("{}, {}", self.lost_replies, self.late_replies)),
             ("bus errors", self.bus_errors.to_string()),
             ("bus frames", or(self.bus_frames_per_s.map(|rate| format!("{rate:.0} a second")))),

@@ -63,7 +63,7 @@ pub struct Line {
     /// Duration of the newest control computation, us.
     pub computation_us: Option<f64>,
     /// The longest one, us.
-    pub computation_worst_us: f64,
+    pub worst_computation_us: f64,
     /// Cycles whose torque frames were not queued in time.
     pub missed_deadlines: u32,
     /// Replies that did not come in their cycle.

@@ -164,7 +164,7 @@ impl Watch {
             adaptation: self.adaptation(),
             surprise: telemetry.map(|cycle| cycle.surprise),
             computation_us: telemetry.map(|_| now),
-            computation_worst_us: worst,
+            worst_computation_us: worst,
             missed_deadlines: self.statistics.missed_deadlines,
             lost_replies: self.statistics.lost_replies,
             bus_errors: self.statistics.bus_errors,
