@@ -45,6 +45,11 @@ impl LogClock {
         us as Ticks * TICKS_PER_MICROSECOND
     }
 
+    /// Moment of the log at a device time, us.
+    pub(super) fn log_time(&self, at: Ticks) -> u64 {
+        ((at / TICKS_PER_MICROSECOND) as i64).saturating_sub(self.offset_us).max(0) as u64
+    }
+
     /// A position request of the device, and the slot that sent it: follows the drift between both clocks.
     pub(super) fn follow(&mut self, frame: &CanFrame, end_us: u64, slot: Ticks) {
         if self.one {

@@ -28,6 +28,9 @@ use engine::Engine;
 /// A frame of the log for which the device has nothing to show after so many slots was not sent by it.
 const SEND_TIMEOUT_SLOTS: Ticks = 6;
 
+/// A frame of the device that the log has not so many slots later, 1 s, was not on the bus.
+const MISSING_SLOTS: Ticks = 900;
+
 /// Frames that are looked through for the one in the log before the rest counts as different.
 const LOOK_AHEAD: usize = 16;
 
@@ -306,6 +309,10 @@ impl Replay {
         while let Some(logged) = self.logged.pop_front_if(|logged| logged.at + SEND_TIMEOUT_SLOTS * SLOT_TICKS < at) {
             self.differ(DifferenceKind::NotSent, Some(&logged), None);
         }
+        // What the device says and the log does not.
+        while let Some(sent) = self.sent.pop_front_if(|(slot, _)| *slot + MISSING_SLOTS * SLOT_TICKS < at) {
+            self.differ(DifferenceKind::NotInLog, None, Some(sent));
+        }
         // Without a host's bus nobody takes the bytes away.
         if !self.outcome.has_host {
             self.backlog = 0;
@@ -325,14 +332,14 @@ impl Replay {
             } else if logged.frame.can_id() == sent.can_id() && logged.frame.payload().first() == sent.payload().first()
             {
                 // The same kind of frame with other contents.
-                let (Some(logged), Some((_, sent))) = (self.logged.pop_front(), self.sent.pop_front()) else {
+                let (Some(logged), Some(sent)) = (self.logged.pop_front(), self.sent.pop_front()) else {
                     return;
                 };
                 self.differ(DifferenceKind::Other, Some(&logged), Some(sent));
                 continue;
             } else if let Some(place) = self.sent.iter().take(LOOK_AHEAD).position(|(_, sent)| *sent == logged.frame) {
                 let extra: Vec<_> = self.sent.drain(..place).collect();
-                for (_, sent) in extra {
+                for sent in extra {
                     self.differ(DifferenceKind::NotInLog, None, Some(sent));
                 }
                 continue;
@@ -348,13 +355,14 @@ impl Replay {
         }
     }
 
-    fn differ(&mut self, kind: DifferenceKind, logged: Option<&Logged>, sent: Option<CanFrame>) {
+    fn differ(&mut self, kind: DifferenceKind, logged: Option<&Logged>, sent: Option<(Ticks, CanFrame)>) {
         self.outcome.different += 1;
         if self.outcome.differences.len() >= KEPT {
             return;
         }
-        let time_us = logged.map_or(self.last_us, |logged| logged.time_us);
-        let sent = sent.map(|frame| self.words(frame));
+        let slot_us = sent.zip(self.clock).map(|((slot, _), clock)| clock.log_time(slot));
+        let time_us = logged.map(|logged| logged.time_us).or(slot_us).unwrap_or(self.last_us);
+        let sent = sent.map(|(_, frame)| self.words(frame));
         self.outcome.differences.push(Difference {
             kind,
             time_s: time_us.saturating_sub(self.first_us.unwrap_or(0)) as f64 * 1e-6,
@@ -382,10 +390,68 @@ impl Replay {
             return Err(ReplayError::NoDevice);
         }
         // What the device sent last may have been on its way when the log ended; what the log has must have been sent.
+        let end = self.engine.next_slot();
+        for sent in std::mem::take(&mut self.sent) {
+            if sent.0 + SEND_TIMEOUT_SLOTS * SLOT_TICKS < end {
+                self.differ(DifferenceKind::NotInLog, None, Some(sent));
+            }
+        }
         for logged in std::mem::take(&mut self.logged) {
             self.differ(DifferenceKind::NotSent, Some(&logged), None);
         }
         let seconds = self.last_us.saturating_sub(self.first_us.unwrap_or(0)) as f64 * 1e-6;
         Ok(Outcome { seconds, slots: self.engine.slots(), cycles: self.engine.cycles(), ..self.outcome })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::simulation::{Engine, Simulation, SimulationOptions, WorldKind};
+
+    /// The arm's bus during the start-up of a simulated device.
+    fn start_up() -> Vec<LogLine> {
+        let mut simulation =
+            Simulation::start(&SimulationOptions::new(Engine::InProcess, 1, WorldKind::Simple)).unwrap();
+        simulation.keep_traffic();
+        simulation.advance_until(Duration::from_secs(4), |_| false).unwrap();
+        let lines = simulation.take_traffic().into_iter().map(|passage| LogLine {
+            time_us: passage.end / sim::TICKS_PER_MICROSECOND,
+            interface: canlog::ARM_INTERFACE.into(),
+            frame: AnyFrame::Data(passage.frame),
+        });
+        lines.collect()
+    }
+
+    fn replayed(lines: Vec<LogLine>) -> Outcome {
+        let mut replay = Replay::default();
+        for (number, line) in (1..).zip(lines) {
+            replay.take(number, line).unwrap();
+        }
+        replay.finish().unwrap()
+    }
+
+    /// A co-controller that fell silent in the log was played to one that speaks, and nothing differed.
+    ///
+    /// The change that makes it fail: frames that the log has not are looked for before the next one that it has.
+    #[test]
+    fn what_the_device_says_behind_the_last_frame_of_the_log_is_a_difference() {
+        let lines = start_up();
+        assert_eq!(replayed(lines.clone()).different, 0);
+        let of_device =
+            |line: &LogLine| matches!(&line.frame, AnyFrame::Data(frame) if frame.can_id().sender() == Node::HOST);
+        for silent_from in [1_000_000, 3_000_000] {
+            let silenced: Vec<LogLine> =
+                lines.iter().filter(|line| line.time_us < silent_from || !of_device(line)).cloned().collect();
+            let left_out = (lines.len() - silenced.len()) as u64;
+            let outcome = replayed(silenced);
+            assert!(outcome.different > 3 && outcome.different + 3 >= left_out, "{left_out}: {outcome:?}");
+            let first = &outcome.differences[0];
+            assert_eq!(first.kind, DifferenceKind::NotInLog);
+            let late = first.time_s - silent_from as f64 * 1e-6;
+            assert!((-0.2..0.5).contains(&late), "{first:?}");
+        }
     }
 }
