@@ -12,7 +12,7 @@
 //! Nothing here looks at a clock of the computer, and no order depends on a hash: equal calls give equal runs.
 
 use crate::bus::{Bus, FOREIGN};
-use crate::fault::{FLOODER, FaultKind, Faults, FrameKind, Injection, Treated};
+use crate::fault::{FaultKind, Faults, FrameKind, Injection, Treated};
 use crate::force_torque::{ForceTorque, ForceTorqueConfig};
 use crate::hand::{Hand, HandConfig};
 use crate::link_wire::{LinkLine, SerialLine};
@@ -504,10 +504,7 @@ impl Plant {
                 _ => {}
             }
         }
-        if let Some(frame) = self.faults.take_flood(self.now) {
-            self.bus.withdraw(FLOODER);
-            self.bus.queue(self.now, FLOODER, frame);
-        }
+        self.faults.send_floods(self.now, &mut self.bus);
         while let Some(passage) = self.faults.take_late(self.now) {
             self.receive(&passage, passage.end, usize::from(!self.faults.is_bus_off()));
         }

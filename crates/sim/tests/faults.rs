@@ -257,3 +257,13 @@ fn torques_stay_in_order_when_their_delay_ends() {
     master.wait_ms(30);
     assert!(master.plant.is_free(), "the last word is zero");
 }
+
+/// The change that makes it fail: of two floods only the first is there.
+#[test]
+fn a11_two_floods_are_two() {
+    let mut master = befallen(FaultKind::Flood { rate: 1000.0, bytes: 1 }, 0.0, 0.01);
+    master.plant.inject(&[Injection { lasts: 0.01, ..ever(FaultKind::Flood { rate: 700.0, bytes: 8 }) }]);
+    master.wait_ms(20);
+    let of_length = |length| master.heard.iter().filter(|(_, frame)| frame.payload().len() == length).count();
+    assert!((9..=11).contains(&of_length(1)) && (6..=8).contains(&of_length(8)), "{} {}", of_length(1), of_length(8));
+}

@@ -2,6 +2,7 @@
 
 use super::check::LARGEST_CLOCK_ERROR;
 use super::{FaultKind, FrameKind, Frames, Injection, Supervised};
+use crate::bus::Bus;
 use crate::noise::Noise;
 use crate::time::{Ticks, seconds, ticks};
 use crate::wire::Passage;
@@ -12,7 +13,7 @@ use std::collections::VecDeque;
 const STREAM: u64 = 0x0FA1;
 
 /// Sender of a flood: no device of an arm has this number.
-pub(crate) const FLOODER: Node = match Node::new(30) {
+const FLOODER: Node = match Node::new(30) {
     Some(node) => node,
     None => unreachable!(),
 };
@@ -35,9 +36,19 @@ struct Order {
     hits: u32,
     /// First frame of each identifier since the begin.
     first: Vec<CanFrame>,
+    /// When the next frame of a flood is due.
+    flood_at: Ticks,
 }
 
 impl Order {
+    /// Time between two frames of a flood, and their bytes.
+    fn flood(&self) -> Option<(Ticks, u8)> {
+        match self.kind {
+            FaultKind::Flood { rate, bytes } if rate > 0.0 => Some((ticks(1.0 / rate).max(1), bytes.min(8))),
+            _ => None,
+        }
+    }
+
     /// True if nothing comes of it any more.
     fn is_over(&self) -> bool {
         let is_of_a_moment =
@@ -72,15 +83,13 @@ pub(crate) struct Faults {
     on_torque: Vec<Injection>,
     noise: Noise,
     late: VecDeque<(Ticks, Passage)>,
-    /// When the next frame of a flood is due.
-    flood_at: Ticks,
 }
 
 impl Faults {
     /// Nothing ordered; `seed` draws frames and bits.
     pub(crate) fn new(seed: u64) -> Self {
         let noise = Noise::new(seed, STREAM);
-        Self { orders: Vec::new(), on_torque: Vec::new(), noise, late: VecDeque::new(), flood_at: 0 }
+        Self { orders: Vec::new(), on_torque: Vec::new(), noise, late: VecDeque::new() }
     }
 
     /// Orders faults whose times count from `zero`.
@@ -91,7 +100,15 @@ impl Faults {
                 let begins = zero + ticks(injection.at + injection.every * f64::from(time));
                 let ends = begins.saturating_add(ticks(injection.lasts));
                 let kind = injection.what.clone();
-                self.orders.push(Order { begins, ends, kind, phase: Phase::Before, hits: 0, first: Vec::new() });
+                self.orders.push(Order {
+                    begins,
+                    ends,
+                    kind,
+                    phase: Phase::Before,
+                    hits: 0,
+                    first: Vec::new(),
+                    flood_at: 0,
+                });
             }
         }
     }
@@ -119,7 +136,7 @@ impl Faults {
             Phase::During if order.ends < Ticks::MAX => Some(order.ends),
             _ => None,
         });
-        let flood = self.flood().map(|_| self.flood_at);
+        let flood = self.present().filter(|order| order.flood().is_some()).map(|order| order.flood_at);
         changes.chain(self.late.front().map(|(at, _)| *at)).chain(flood).min()
     }
 
@@ -141,22 +158,19 @@ impl Faults {
         self.late.pop_front_if(|(at, _)| *at <= now).map(|(_, passage)| passage)
     }
 
-    /// A frame of a flood that is due.
-    pub(crate) fn take_flood(&mut self, now: Ticks) -> Option<CanFrame> {
-        let (every, bytes) = self.flood()?;
-        if self.flood_at > now {
-            return None;
+    /// Sends the frames of floods that are due, in place of those that could not leave.
+    pub(crate) fn send_floods(&mut self, now: Ticks, bus: &mut Bus) {
+        let mut is_first = true;
+        for order in self.orders.iter_mut().filter(|order| order.phase == Phase::During && order.flood_at <= now) {
+            let Some((every, bytes)) = order.flood() else { continue };
+            order.flood_at = now + every;
+            if std::mem::take(&mut is_first) {
+                bus.withdraw(FLOODER);
+            }
+            if let Some(frame) = CanFrame::from_slice(FIRST, &[0x55; 8][..usize::from(bytes)]) {
+                bus.queue(now, FLOODER, frame);
+            }
         }
-        self.flood_at = now + every;
-        CanFrame::from_slice(FIRST, [0x55; 8].get(..usize::from(bytes))?)
-    }
-
-    /// Time between two frames of the flood that goes on, and their bytes.
-    fn flood(&self) -> Option<(Ticks, u8)> {
-        self.present().find_map(|order| match order.kind {
-            FaultKind::Flood { rate, bytes } if rate > 0.0 => Some((ticks(1.0 / rate).max(1), bytes.min(8))),
-            _ => None,
-        })
     }
 
     /// Share by which the co-controller's clock is slow.

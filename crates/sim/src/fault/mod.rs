@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::operator::PendantAction;
 use puck::{CanFrame, Destination, Group, Node, Request};
 
-pub(crate) use engine::{FLOODER, Faults, Treated};
+pub(crate) use engine::{Faults, Treated};
 
 /// A fault, when it begins and when it ends.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
