@@ -166,6 +166,8 @@ pub(crate) struct Startup {
     doubt: Option<StartupError>,
     /// Words with which the safety module is still to be told so.
     revocations: u8,
+    /// The safety module's word about the zero before any puck was woken; none has been heard yet.
+    zero_before: Option<bool>,
     /// Payload that a person has declared.
     declared: Option<Payload>,
     /// The posture that `targets` are the counts of (rad).
@@ -213,6 +215,7 @@ impl Startup {
             tared_anew: false,
             doubt: None,
             revocations: 0,
+            zero_before: None,
             declared: None,
             home: [0.0; 7],
             zeroed_at: None,
@@ -229,6 +232,7 @@ impl Startup {
     pub(crate) fn restart(&mut self, now_us: u64, last: Option<[(Counts, u8); 7]>) {
         *self = Startup {
             doubt: self.doubt,
+            revocations: self.revocations,
             tared: self.tared,
             tared_anew: self.tared_anew,
             angles: self.angles,
@@ -474,7 +478,7 @@ impl Startup {
         match self.step {
             Step::ZeroTorques { frame } => Ok(self.take_torque_off(frame, outlet)),
             Step::Enumerate { node, powered } => Ok(self.enumerate(node, powered, outlet)),
-            Step::Listen { until_us, .. } if outlet.now_us() < until_us => Ok(Next::Stay),
+            Step::Listen { until_us, powered } if outlet.now_us() < until_us => Ok(self.listen(powered, outlet)),
             Step::Listen { powered: false, .. } => {
                 if !self.survey.is_present(Node::SAFETY_MODULE) {
                     return Err(StartupError::NoSafetyModule);
@@ -551,27 +555,10 @@ impl Startup {
         let (continuity, tared, angles, declared) = (self.continuity, self.tared, self.angles, self.declared);
         // The answer to a person who wanted to zero in this very slot is told behind it.
         let (tared_anew, stopping, zero_request) = (self.tared_anew, self.stopping, self.zero_request);
-        let zeroed_at = self.zeroed_at;
+        let (zeroed_at, revocations) = (self.zeroed_at, self.revocations);
         *self = Startup { error, doubt, hand, continuity, tared, angles, declared, zeroed_at, ..Startup::new() };
+        self.revocations = revocations;
         (self.tared_anew, self.stopping, self.zero_request) = (tared_anew, stopping, zero_request);
-    }
-
-    /// Asks the safety module if positions count from a known pose.
-    fn ask_zero(&mut self, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
-        let Some(zero) = self.ask_safety(self.safety()?.zero, outlet)? else { return Ok(Next::Stay) };
-        self.zeroed = zero != 0 && self.doubt.is_none();
-        self.zeroed_at = self.zeroed_at();
-        Ok(match zero {
-            0 => {
-                self.error = None;
-                self.await_next_zero(outlet)
-            }
-            _ if self.doubt.is_some() => {
-                self.error = self.doubt;
-                Next::Go(Step::RevokeZero { word: 0 })
-            }
-            _ => Next::Go(Step::Tare),
-        })
     }
 
     fn safety(&self) -> Result<&SafetyProperties, StartupError> {

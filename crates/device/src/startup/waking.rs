@@ -4,7 +4,9 @@ use control::act::limit::MOTOR_COUNTS_LIMIT;
 use puck::{Group, MotorMode, Node, PropertyId, SafetyMode, Status, get, set, stop_frames};
 
 use super::survey::{DRIVE_PROPERTIES, PACKING_LIMIT, Survey};
-use super::{ENUMERATED, Next, POLL_US, STOP_PACE_US, STOPPING_US, STOPS_ONLY_US, Startup, Step, Stopping, after};
+use super::{
+    ENUMERATED, Next, POLL_US, REVOCATIONS, STOP_PACE_US, STOPPING_US, STOPS_ONLY_US, Startup, Step, Stopping, after,
+};
 use crate::bus::{Answer, Outlet};
 use crate::stage::StartupError;
 
@@ -69,6 +71,17 @@ impl Startup {
             return Next::Go(Step::Listen { until_us: outlet.now_us() + LISTEN_US, powered });
         };
         after(outlet.send(get(node, PropertyId::STAT)), Step::Enumerate { node: number + 1, powered })
+    }
+
+    /// The pucks have power, and their answers are awaited: asks the safety module about the zero meanwhile. Whoever of
+    /// them sleeps has lost it, and nobody sees that any more once it is awake.
+    pub(super) fn listen(&mut self, powered: bool, outlet: &mut impl Outlet) -> Next {
+        if let (true, None, Some(safety)) = (powered, self.zero_before, self.safety)
+            && let Answer::Value(zero) = self.exchange.ask(Node::SAFETY_MODULE, safety.zero, outlet)
+        {
+            self.zero_before = Some(zero != 0);
+        }
+        Next::Stay
     }
 
     pub(super) fn count_pucks(&mut self) -> Result<Next, StartupError> {
@@ -180,8 +193,20 @@ impl Startup {
             return Next::Go(Step::Wake { device: index + 1, woken });
         }
         if node.arm_index().is_some() {
-            // Its counts began with its firmware.
-            self.doubt.get_or_insert(StartupError::CountsAnew(node));
+            // Its counts began with its firmware. The safety module hears of it before the puck is woken: a board that
+            // restarts later would take its word.
+            let doubt = *self.doubt.get_or_insert(StartupError::CountsAnew(node));
+            let told = self.zero_before.replace(false);
+            if told == Some(true) {
+                self.error = Some(doubt);
+            }
+            if told != Some(false) {
+                self.revocations = REVOCATIONS;
+            }
+            if self.revocations > 0 {
+                self.revoke_zero(outlet);
+                return Next::Stay;
+            }
         }
         // A sensor that slept has forgotten its tare.
         self.tared &= node != Node::FORCE_TORQUE;

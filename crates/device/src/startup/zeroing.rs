@@ -107,6 +107,25 @@ impl Startup {
         Ok(self.refuse_zero(outlet))
     }
 
+    /// Asks the safety module if positions count from a known pose.
+    pub(super) fn ask_zero(&mut self, outlet: &mut impl Outlet) -> Result<Next, StartupError> {
+        let Some(zero) = self.ask_safety(self.safety()?.zero, outlet)? else { return Ok(Next::Stay) };
+        self.zeroed = zero != 0 && self.doubt.is_none();
+        self.zeroed_at = self.zeroed_at();
+        Ok(match zero {
+            0 => {
+                // A doubt that has cost a zero is told still, what has passed is not.
+                self.error = self.error.filter(|error| Some(*error) == self.doubt);
+                self.await_next_zero(outlet)
+            }
+            _ if self.doubt.is_some() => {
+                self.error = self.doubt;
+                Next::Go(Step::RevokeZero { word: 0 })
+            }
+            _ => Next::Go(Step::Tare),
+        })
+    }
+
     /// The arm is not idle, or it moves. Back to where the command came in: to the loop, or to the person.
     pub(super) fn refuse_zero(&mut self, outlet: &mut impl Outlet) -> Next {
         self.zero_request = ZeroRequest::Answered(Err(Refusal::ZeroNeedsIdle));

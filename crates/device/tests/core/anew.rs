@@ -130,8 +130,9 @@ fn g2_a_doubt_outlives_an_emergency_stop_that_was_none() {
     for tries_to_zero in [false, true] {
         let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
         bus.pucks[3].awake_at = None;
-        bus.run_until(&mut core, Stage::Reading);
-        bus.lose_safety_writes = 3;
+        bus.run_until(&mut core, Stage::Waking);
+        // Before the puck is woken, and behind that.
+        bus.lose_safety_writes = 6;
         bus.run_until(&mut core, Stage::WaitingForZero);
         bus.run(&mut core, 0.1);
         assert_eq!((bus.lose_safety_writes, bus.safety_zero), (0, true));

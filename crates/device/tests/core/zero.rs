@@ -369,6 +369,33 @@ fn g2_a_zeroing_that_breaks_off_leaves_no_zero_that_anybody_believes() {
     }
 }
 
+/// G2: a puck has restarted and is woken, and then the board restarts: to it the puck looks as if it had never slept.
+/// Or the start-up is blocked behind the wake, and a person switches the board off and on.
+///
+/// The change that makes it fail: the safety module is not told before the first puck is woken.
+#[test]
+fn g2_a_puck_that_was_woken_is_not_believed_by_a_board_that_restarts_at_any_moment() {
+    for declared in [None, Some(control::Payload::None)] {
+        for slots in (0..2800).step_by(40) {
+            let (mut core, mut bus) = (silent_device(), Bus::already_zeroed());
+            if let Some(payload) = declared {
+                // The sensor that answers is none that was declared.
+                let weight = control::model::WeightCorrection::none(payload);
+                assert!(core.weigh(&device::weight::StoredWeight::Kept(weight)));
+            }
+            bus.pucks[3].awake_at = None;
+            bus.run_slots(&mut core, slots);
+            let mut other = silent_device();
+            bus.run(&mut other, 4.0);
+            assert_eq!(
+                (other.stage(), other.health().zeroed),
+                (Stage::WaitingForZero, false),
+                "{declared:?}, after {slots} slots"
+            );
+        }
+    }
+}
+
 /// G2: the words by which the safety module is to forget its zero have no acknowledge. One is lost, and the board
 /// restarts: whoever believes the module takes counts that began anew for those of a zeroed arm.
 #[test]
@@ -387,7 +414,7 @@ fn g2_a_lost_word_to_the_safety_module_leaves_no_zero_that_a_board_that_restarts
             "puck" => {
                 core = silent_device();
                 bus.pucks[3].awake_at = None;
-                bus.run_until(&mut core, Stage::Reading);
+                bus.run_until(&mut core, Stage::Waking);
                 bus.lose_safety_writes = lost;
                 bus.run_until(&mut core, Stage::WaitingForZero);
                 bus.run(&mut core, 0.3);
