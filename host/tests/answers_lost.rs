@@ -145,3 +145,44 @@ fn a_secret_that_the_device_keeps_or_forgets_is_told_whatever_becomes_of_the_lin
     assert_eq!(output.status.code(), Some(7), "{}", said(&output));
     assert!(said(&output).contains("the device has forgotten the secret"), "{}", said(&output));
 }
+
+/// The device kept what it was told, and the command ended as if nothing had been: what is asked behind it, only to be
+/// shown, had no answer.
+///
+/// The change that makes it fail: the failure of what is shown is told alone.
+#[test]
+fn what_the_device_keeps_is_told_as_kept_though_it_cannot_be_shown() {
+    type Last = fn(&Request) -> bool;
+    let cases: [(&str, Last, &str); 3] = [
+        ("tare --at-home", |request| matches!(request, Request::Tare), "the zero is taken"),
+        ("calibrate payload hand", |request| matches!(request, Request::KeepWeight { .. }), "keeps the declaration"),
+        ("calibrate gravity --reset", |request| matches!(request, Request::ForgetWeight), "forgotten the measured"),
+    ];
+    for (line, last, words) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        let _arm = Arm::start(folder.path(), NOTHING);
+        let output = broken_behind(folder.path(), last, &format!("--non-interactive {line}"));
+        let told = format!("{}{}", said(&output), String::from_utf8_lossy(&output.stdout));
+        assert!(told.contains(words), "{line}: {told}");
+        assert_eq!(output.status.code(), Some(7), "{line}: {told}");
+    }
+}
+
+/// The line dies before the device has answered that it keeps the home. The report said that it does not.
+///
+/// The change that makes it fail: whatever is no success is reported as not kept.
+#[test]
+fn a_home_whose_answer_is_lost_is_reported_as_nobody_knows() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let _arm = Arm::start(at, NOTHING);
+    let line = "--non-interactive calibrate home --set 0.02,-1.97,0.01,3.1,0,0.03,-0.05 --report found.json";
+    let output = broken_behind(at, |request| matches!(request, Request::Hello(_)), line);
+    let report: Value = serde_json::from_slice(&std::fs::read(at.join("found.json")).unwrap()).unwrap();
+    assert_eq!(report["kept"], Value::Null, "{}", said(&output));
+    assert_eq!(output.status.code(), Some(7), "{}", said(&output));
+    assert!(said(&output).contains("`tactus calibrate show` tells"), "{}", said(&output));
+    let told = crate::served_arm::tactus(at, "--json calibrate show");
+    let told: Value = serde_json::from_slice(&told.stdout).unwrap();
+    assert_eq!(told["stored"], true, "the device keeps it: {told}");
+}

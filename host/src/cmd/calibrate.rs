@@ -78,6 +78,9 @@ fn posture(text: &str) -> Result<Posture, String> {
 
 const DOING: &str = "calibrate";
 
+/// Tells which home the device keeps.
+const LOOK: &str = "tactus calibrate show";
+
 /// Shows, stores or forgets the home of the arm.
 ///
 /// # Errors
@@ -100,7 +103,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
         Action::Home(Home { set: Some(home), report, .. }) => {
             let report = CalibrationReport::open(report.as_deref(), &[], &client, global, DOING)?;
             let stored = store(&mut client, home.map(|angle| angle as f32), None, global);
-            let written = report.write("home", stored.is_ok(), &json!({ "home_rad": home }), global);
+            let is_kept = calibration_report::is_kept(&stored, LOOK, global);
+            let written = report.write("home", is_kept, &json!({ "home_rad": home }), global);
             stored?;
             global.tell_forgotten();
             if written.is_err() {
@@ -115,7 +119,8 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
             let corrected = procedure::correct_home(&mut client, *truth);
             let correction = corrected.map_err(|error| connection::failure(error, DOING))?;
             let stored = store(&mut client, correction.home, Some(&correction), global);
-            let written = report.write("home", stored.is_ok(), &data(&correction), global);
+            let is_kept = calibration_report::is_kept(&stored, LOOK, global);
+            let written = report.write("home", is_kept, &data(&correction), global);
             stored?;
             global.tell_forgotten();
             let text = format!("{}stored in the device", table(&correction));

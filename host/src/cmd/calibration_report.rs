@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use lab::client::Client;
 use lab::device::Device;
+use lab::error_code::Exit;
 use lab::output_file::OutputFile;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -42,11 +43,17 @@ impl CalibrationReport {
         Ok(Self { opened, serial, device: origin.device, firmware: origin.firmware, date: origin.date })
     }
 
-    /// Writes what was found, whether or not the device keeps it.
+    /// Writes what was found, whether or not the device keeps it; `is_kept` is none where nobody knows.
     ///
     /// # Errors
     /// The system refuses.
-    pub(super) fn write(self, action: &str, is_kept: bool, found: &Value, global: &Global) -> Result<(), Failure> {
+    pub(super) fn write(
+        self,
+        action: &str,
+        is_kept: Option<bool>,
+        found: &Value,
+        global: &Global,
+    ) -> Result<(), Failure> {
         let Some((file, path)) = self.opened else { return Ok(()) };
         let report = json!({
             "schema": SCHEMA, "action": action, "serial": self.serial, "device": self.device, "firmware": self.firmware,
@@ -56,6 +63,17 @@ impl CalibrationReport {
         global.output().say(format!("wrote {}", path.display()));
         Ok(())
     }
+}
+
+/// True if the device keeps what it was to keep, as it answered; `None` if its answer was lost with the line. That is
+/// said, with the command that looks.
+pub(super) fn is_kept<T>(told: &Result<T, Failure>, look: &str, global: &Global) -> Option<bool> {
+    let Err(failure) = told else { return Some(true) };
+    if failure.code.exit() != Exit::LinkLost {
+        return Some(false);
+    }
+    global.output().say(format!("no answer came: whether the device keeps it `{look}` tells"));
+    None
 }
 
 /// Tells what was found, also where its report could not be written: minutes of measuring are not lost with a disk.

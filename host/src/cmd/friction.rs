@@ -48,7 +48,7 @@ pub(super) fn run(command: &Friction, client: &mut Client<Device>, global: &Glob
     let crossings = measured.map_err(|error| connection::failure(error, DOING))?;
     let joints =
         measure(&weight, &crossings).map_err(|error| Failure::new(ErrorCode::FrictionNotTold, DOING, error))?;
-    let written = report.write("friction", false, &data(&joints), global);
+    let written = report.write("friction", Some(false), &data(&joints), global);
     let text = format!("{}shown only: the device goes on with the model's", table(&joints));
     calibration_report::tell(written, &data(&joints), text, global)
 }

@@ -246,7 +246,10 @@ fn write(
             WriteError::ReadBack(_) => Failure::new(ErrorCode::SettingsNotKept, doing, error),
         };
         // What was kept before the failure is told, if the device still answers.
-        let Ok(kept) = Settings::of_device(client) else { return Err(failure) };
+        let Ok(kept) = Settings::of_device(client) else {
+            global.output().say("whether the device keeps the new settings `tactus config get` tells");
+            return Err(failure);
+        };
         return Err(failure.data(serde_json::json!(compared(client, &before.changes(&kept), Vec::new()))));
     }
     let changes = before.changes(after);

@@ -33,7 +33,11 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     } else {
         connection::joints_read(&mut client, command.at_home, global.output(), DOING)?;
     }
-    let tared = procedure::tare(&mut client, command.loaded);
+    let mut is_taken = false;
+    let tared = procedure::tare(&mut client, command.loaded, || is_taken = true);
+    if is_taken && tared.is_err() {
+        global.output().say("the zero is taken; only the readings with it could not be shown");
+    }
     let tared = tared.map_err(|error| connection::failed(&mut client, error, DOING))?;
     // The zero is taken: what is only told beside it fails nothing.
     if tared.after.gauges_nm.is_none()

@@ -46,7 +46,11 @@ pub(super) fn run(command: &Gravity, client: &mut Client<Device>, global: &Globa
         forget(client, global)?;
     }
     if command.show || command.reset {
-        let weight = client.weight().map_err(|error| error.into_failure(DOING))?;
+        let weight = client.weight().map_err(|error| error.into_failure(DOING)).inspect_err(|_| {
+            if command.reset {
+                global.output().say("the device has forgotten the measured weight");
+            }
+        })?;
         return global.output().result(&weight_data(&weight), weight_text(&weight));
     }
     let report = CalibrationReport::open(command.report.as_deref(), &[], client, global, DOING)?;
@@ -64,7 +68,8 @@ pub(super) fn run(command: &Gravity, client: &mut Client<Device>, global: &Globa
     let kept = judged.and_then(|()| {
         client.keep_weight(&weighing.correction).map_err(|error| error.into_failure(DOING).data(data(&weighing)))
     });
-    let written = report.write("gravity", kept.is_ok(), &data(&weighing), global);
+    let is_kept = calibration_report::is_kept(&kept, "tactus calibrate gravity --show", global);
+    let written = report.write("gravity", is_kept, &data(&weighing), global);
     kept?;
     global.tell_forgotten();
     let text =

@@ -66,12 +66,12 @@ pub struct Tared {
 
 /// Takes the present readings of force sensor and gauges as zero, or of those of them that the device has. Arm and hand
 /// have to stand. With `loaded` what is more than the drift of a sensor becomes zero too. Nothing moves and nothing is
-/// stored.
+/// stored. `taken` hears that the device has taken the zero: what fails behind that fails to show it.
 ///
 /// # Errors
 /// [`ProcedureError::NothingToTare`], [`ProcedureError::Moves`], [`ProcedureError::HandMoves`],
 /// [`ProcedureError::Loaded`], [`ProcedureError::Grips`], and as [`Client::request`].
-pub fn tare(client: &mut Client<Device>, loaded: bool) -> Result<Tared, ProcedureError> {
+pub fn tare(client: &mut Client<Device>, loaded: bool, taken: impl FnOnce()) -> Result<Tared, ProcedureError> {
     let status = client.status()?;
     let sensors = Sensors::of(&status);
     if !sensors.wrist && !sensors.fingers {
@@ -93,5 +93,6 @@ pub fn tare(client: &mut Client<Device>, loaded: bool) -> Result<Tared, Procedur
         return Err(ProcedureError::Grips { finger, torque: gauges[finger] });
     }
     client.tare()?;
+    taken();
     Ok(Tared { before: known.then_some(before), after: sensors.read(&at_rest(client)?) })
 }

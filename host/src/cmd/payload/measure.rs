@@ -46,7 +46,7 @@ pub(super) fn run(command: &Payload, client: &mut Client<Device>, global: &Globa
     let found = Measured::new(declared(&kept), &load, object.as_ref(), judged.err(), advice.clone());
     // Texts and numbers only.
     let data = serde_json::to_value(&found).unwrap_or_default();
-    let written = report.write("payload", false, &data, global);
+    let written = report.write("payload", Some(false), &data, global);
     let shown =
         format!("{}{}", table(&load), object.as_ref().map(|of| object_table(of).to_string()).unwrap_or_default());
     if let Err(contradiction) = judged {

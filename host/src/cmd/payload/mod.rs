@@ -98,6 +98,11 @@ pub(super) fn run(command: &Payload, client: &mut Client<Device>, global: &Globa
         }
         .map_err(failed)?;
         global.tell_forgotten();
+        let kept = match carries.payload() {
+            Some(_) => "the device keeps the declaration",
+            None => "the device has forgotten the declaration",
+        };
+        return show(client, global).inspect_err(|_| global.output().say(kept));
     }
     show(client, global)
 }
