@@ -329,8 +329,8 @@ error_codes! {
     SettingsNotKept = 648: "reading the settings back gave other values", "the device's storage, or the line",
         "restore them again; if it persists the device's storage is worn out";
     FrictionNotTold = 649: "the passes do not tell the friction of the joints",
-        "messages were lost, or the device let the arm move at one speed only",
-        "`tactus status --line 10`, then again";
+        "messages were lost, the device let the arm move at one speed only, or something moved a joint",
+        "free the arm, `tactus status --line 10`, then again";
     LoadNotTold = 650: "what the wrist carries cannot be told",
         "there is no wrist sensor, messages were lost, or what is held moved in the hand",
         "hold it fast, keep it from touching anything, then again";

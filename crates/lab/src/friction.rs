@@ -30,6 +30,12 @@ pub const FEWEST: usize = 4;
 /// Least difference between the slowest and the fastest pass of a joint, rad/s.
 pub const LEAST_RANGE: f64 = 0.05;
 
+/// Standard errors beyond which friction below zero is no chance.
+const DEVIATIONS: f64 = 3.0;
+
+/// Friction that nobody can tell from none, N m.
+const LEAST: f64 = 0.02;
+
 /// A number with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Estimate {
@@ -52,6 +58,13 @@ pub struct JointFriction {
     pub speeds: [f64; 2],
 }
 
+impl JointFriction {
+    /// Friction at a speed (rad/s), N m.
+    fn at(&self, speed: f64) -> f64 {
+        self.coulomb.value + self.viscous.value * speed
+    }
+}
+
 /// Why friction cannot be told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FrictionError {
@@ -64,6 +77,17 @@ pub enum FrictionError {
     /// A sample is not a number.
     #[error("a joint angle, velocity or torque is not a number")]
     NotANumber,
+    /// The torques turned the joint less than it turned: something moved it.
+    #[error(
+        "J{} seems to have friction of {:.2} N m: something moves it, or its torque is not what it is told",
+        .joint + 1, f64::from(*.milli_nm) * 1e-3
+    )]
+    Negative {
+        /// The joint, 0 for J1.
+        joint: usize,
+        /// Friction at its slowest pass, mN m.
+        milli_nm: i32,
+    },
     /// All passes had about the same speed.
     #[error("J{} was passed at one speed only", .joint + 1)]
     OneSpeed {
@@ -128,6 +152,10 @@ pub fn measure(weight: &WeightCorrection, crossings: &[Crossing]) -> Result<[Joi
         *friction = line(&points).ok_or(FrictionError::OneSpeed { joint })?;
         if !friction.left.is_finite() {
             return Err(FrictionError::NotANumber);
+        }
+        let (slowest, doubt) = (friction.at(friction.speeds[0]), DEVIATIONS * friction.coulomb.error + LEAST);
+        if slowest < -doubt {
+            return Err(FrictionError::Negative { joint, milli_nm: (slowest * 1e3) as i32 });
         }
     }
     Ok(joints)

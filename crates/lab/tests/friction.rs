@@ -139,3 +139,28 @@ fn what_tells_no_friction_is_refused() {
     silent.iter_mut().skip(3).for_each(|crossing| crossing.down.clear());
     assert_eq!(measure(&weight, &silent), Err(FrictionError::TooFew { passes: 3 }));
 }
+
+/// A person helps the arm along, or a drive has its sign wrong: the joint seemed to drive itself, and that was told as
+/// its friction.
+///
+/// The change that makes it fail: friction below zero is told.
+#[test]
+fn friction_below_zero_is_none_and_names_the_joint() {
+    for joint in [0, 3, 6] {
+        let mut helped = Arm::MODEL.passes();
+        let sent = helped.iter_mut().flat_map(|crossing| crossing.up.iter_mut().chain(&mut crossing.down));
+        sent.for_each(|sample| {
+            sample.torque[joint] -= sample.speed[joint].signum() * (COULOMB[joint] + VISCOUS[joint] + 0.1);
+        });
+        let told = measure(&WeightCorrection::none(Payload::SensorAndHand), &helped);
+        assert!(matches!(told, Err(FrictionError::Negative { joint: named, .. }) if named == joint), "{told:?}");
+    }
+    // Next to none is not below it.
+    let smooth = Arm { coulomb: [0.0; 7], viscous: [0.0; 7], ..Arm::MODEL };
+    smooth.measured().unwrap();
+    let mut words = String::new();
+    if let Err(error) = (Arm { coulomb: [-0.5; 7], viscous: [0.0; 7], ..Arm::MODEL }).measured() {
+        words = error.to_string();
+    }
+    assert!(words.starts_with("J1 seems to have friction of -0."), "{words}");
+}
