@@ -170,6 +170,14 @@ pub(crate) struct Balance {
     friction: [f64; 7],
 }
 
+impl Balance {
+    /// True if every number is one: what is none agrees with any bound, as a comparison has it.
+    fn is_finite(&self) -> bool {
+        let torques = self.torque.iter().chain(&self.model).chain(&self.friction);
+        torques.chain(self.regressor.iter()).all(|number| number.is_finite())
+    }
+}
+
 /// The model, and the model with one number of the correction at the prior's deviation.
 pub(crate) struct Arms {
     model: ArmModel<f64>,
@@ -263,15 +271,17 @@ pub fn weigh(
     fitted: &[Crossing],
     held_out: &[Crossing],
 ) -> Result<Weighing, WeighError> {
-    if fitted.len() < FEWEST.0
-        || held_out.len() < FEWEST.1
-        || fitted.iter().chain(held_out).any(|crossing| crossing.up.is_empty() || crossing.down.is_empty())
-    {
+    // A posture of which one pass was not seen tells nothing.
+    let complete = |crossing: &&Crossing| !crossing.up.is_empty() && !crossing.down.is_empty();
+    let arms = Arms::new(payload).map_err(WeighError::Absurd)?;
+    let [fitted, held_out] = [fitted, held_out]
+        .map(|crossings| crossings.iter().filter(complete).map(|crossing| arms.row(crossing)).collect::<Vec<_>>());
+    if fitted.len() < FEWEST.0 || held_out.len() < FEWEST.1 {
         return Err(WeighError::TooFew { fitted: fitted.len(), held_out: held_out.len() });
     }
-    let arms = Arms::new(payload).map_err(WeighError::Absurd)?;
-    let [fitted, held_out] =
-        [fitted, held_out].map(|crossings| crossings.iter().map(|crossing| arms.row(crossing)).collect::<Vec<_>>());
+    if !fitted.iter().chain(&held_out).all(Balance::is_finite) {
+        return Err(WeighError::NotANumber);
+    }
     let (mut normal, mut right) = (SMatrix::<f64, NUMBERS, NUMBERS>::zeros(), SVector::<f64, NUMBERS>::zeros());
     for row in &fitted {
         for (joint, noise) in NOISE.iter().enumerate() {
