@@ -43,6 +43,7 @@ pub struct Bus {
     submissions: u64,
     trace: BusTrace,
     log: Option<Vec<Passage>>,
+    heard: Option<Vec<Passage>>,
 }
 
 impl Bus {
@@ -140,6 +141,23 @@ impl Bus {
     /// Takes out the frames kept so far; keeping goes on.
     pub fn take_recorded(&mut self) -> Vec<Passage> {
         self.log.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Starts to keep what is noted as heard.
+    pub fn record_heard(&mut self) {
+        self.heard.get_or_insert_with(Vec::new);
+    }
+
+    /// A frame has arrived.
+    pub fn note_heard(&mut self, passage: &Passage) {
+        if let Some(heard) = &mut self.heard {
+            heard.push(*passage);
+        }
+    }
+
+    /// Takes out what was heard so far; keeping goes on.
+    pub fn take_heard(&mut self) -> Vec<Passage> {
+        self.heard.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// The first unsent frame of each node: only these compete.

@@ -11,6 +11,8 @@
 //! a frame, the devices, the safety module, the operator, and arbitration last, when all who compete have spoken.
 //! Nothing here looks at a clock of the computer, and no order depends on a hash: equal calls give equal runs.
 
+mod recording;
+
 use crate::bus::{Bus, FOREIGN};
 use crate::fault::{FaultKind, Faults, FrameKind, Injection, Treated};
 use crate::force_torque::{ForceTorque, ForceTorqueConfig};
@@ -323,22 +325,6 @@ impl Plant {
         self.bus.trace().clone()
     }
 
-    /// Keeps every frame from now on.
-    pub fn record_bus(&mut self) {
-        self.bus.record();
-    }
-
-    /// The frames kept since [`Plant::record_bus`].
-    #[must_use]
-    pub fn recorded(&self) -> &[Passage] {
-        self.bus.recorded()
-    }
-
-    /// Takes out the frames kept since [`Plant::record_bus`] or the last call; the last one may still be on the wire.
-    pub fn take_recorded(&mut self) -> Vec<Passage> {
-        self.bus.take_recorded()
-    }
-
     /// From now on the force/torque sensor errs by more and more, after `over` by `error` (N and N m, sensor axes), and
     /// stays so: an error that no tare before it can catch.
     pub fn creep_force_torque(&mut self, error: [f64; 6], over: Ticks) {
@@ -514,6 +500,7 @@ impl Plant {
     fn deliver(&mut self, passage: &Passage) {
         if passage.sender == Node::HOST {
             self.deliveries.push_back(Delivery { at: passage.end, received: None });
+            self.bus.note_heard(passage);
         }
         if let Treated::Received(frame, copies) = self.faults.treat(self.now, passage) {
             self.receive(&Passage { frame, ..*passage }, passage.received_at(), copies);
@@ -525,6 +512,7 @@ impl Plant {
         if passage.sender != Node::HOST {
             let delivery = Delivery { at: passage.end, received: Some(passage.frame) };
             self.deliveries.extend(std::iter::repeat_n(delivery, copies));
+            self.bus.note_heard(passage);
         }
         if let Ok(request) = Request::decode(&passage.frame)
             // What a puck says is a request to nobody; the safety module is the only device that gives orders.

@@ -454,4 +454,30 @@ mod tests {
             assert!((-0.2..0.5).contains(&late), "{first:?}");
         }
     }
+
+    /// Frames that a fault had lost or changed stood in the log, and the device of the replay received them.
+    ///
+    /// The change that makes it fail: the log of a simulation has frames of pucks as they were sent.
+    #[test]
+    fn the_log_of_a_start_up_with_faults_replays_and_has_what_was_received() {
+        let folder = tempfile::tempdir().unwrap();
+        let (script, log) = (folder.path().join("faults.toml"), folder.path().join("bus.log"));
+        let lost = "{ at = 0.3, what.drop = { kind = \"property\", from = [4], most = 3 } }";
+        let changed = "{ at = 0.6, what.flip = { kind = \"property\", from = [10], most = 2 } }";
+        let text = format!("[[scenario]]\nname = \"a\"\nfrom = \"power-up\"\ninject = [{lost}, {changed}]\n");
+        std::fs::write(&script, text).unwrap();
+        let mut simulation = Simulation::start(&SimulationOptions {
+            faults: Some(script.to_str().unwrap().to_owned()),
+            bus_log: Some(log.clone()),
+            ..SimulationOptions::new(Engine::InProcess, 1, WorldKind::Simple)
+        })
+        .unwrap();
+        simulation.advance_until(Duration::from_secs(4), |_| false).unwrap();
+        simulation.log_buses(&[]).unwrap();
+        let lines: Vec<LogLine> =
+            std::fs::read_to_string(&log).unwrap().lines().map(|line| line.parse().unwrap()).collect();
+        assert!(lines.len() > 300);
+        let outcome = replayed(lines);
+        assert_eq!(outcome.different, 0, "{outcome:?}");
+    }
 }

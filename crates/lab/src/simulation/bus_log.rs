@@ -1,7 +1,8 @@
 //! A log of the simulated buses as `candump -L` writes it: `can0` is the arm's bus, `can1` the host's.
 //!
 //! A line's time is the moment at which the receivers have the frame, virtual seconds since power-up. Six decimals,
-//! as every tool that reads such files expects.
+//! as every tool that reads such files expects. Where a fault is injected, frames of the co-controller stand as it sent
+//! them, and all others as they were received: a lost one does not, a late one stands where it came.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};

@@ -76,7 +76,7 @@ impl Simulation {
             FaultScript::read(name, matches!(options.engine, Engine::InProcess))?.order(&mut plant);
         }
         if options.bus_log.is_some() {
-            plant.record_bus();
+            plant.record_heard();
         }
         let engine: Box<dyn Execute> = match &options.engine {
             Engine::InProcess => Box::new(InProcess::new(options.flash.chip()?, options.uptime)),
@@ -173,12 +173,11 @@ impl Simulation {
 
     /// Hands what the arm's bus has carried to those who want it.
     fn collect(&mut self) {
-        let passages = self.plant.take_recorded();
         if let Some(log) = &mut self.log {
-            log.arm(&passages);
+            log.arm(&self.plant.take_heard());
         }
         if let Some(traffic) = &mut self.traffic {
-            traffic.extend(passages);
+            traffic.extend(self.plant.take_recorded());
         }
     }
 
