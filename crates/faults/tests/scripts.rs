@@ -52,7 +52,8 @@ fn a_word_that_means_nothing_is_refused_with_its_line() {
 fn a_fault_that_means_nothing_is_refused_with_its_scenario() {
     let refused = |to: &str| read(&SCRIPT.replace("what.refuse = \"torques\"", to)).expect_err("it means nothing");
     let words = "for ever: fault 1: node is 11; it must be from 1 to 7";
-    assert!(refused("what.restart.node = 11").contains(words), "{}", refused("what.restart.node = 11"));
+    let jump = "what.count-jump = { node = 11, by = 1 }";
+    assert!(refused(jump).contains(words), "{}", refused(jump));
     assert!(refused("times = 3, what = \"bus-off\"").contains("every is 0"));
     let late = SCRIPT.replace("recover = \"none\"", "late = [{ at = 1, what.restart.node = 0 }]");
     assert!(read(&late).expect_err("no such puck").contains("node is 0"));

@@ -306,7 +306,9 @@ impl Refusal {
             Self::OutsideJointLimits | Self::OutsideWorkspace => "choose a target the arm can reach",
             Self::CauseRemains => "remove the cause and let the arm come to rest",
             Self::Moving => "let the arm come to rest",
-            Self::WrenchMissing => "check the force sensor and its cable",
+            Self::WrenchMissing => {
+                "check the force sensor and its cable; one that lost its power comes back behind an emergency stop"
+            }
             Self::NoAnswer => "send the request again; if it persists restart the device",
             Self::ZeroNeedsIdle => "press Shift+Idle on the pendant, hold the arm still, then zero it",
             Self::NoHand => "check the hand's cable; its four pucks are looked for when the arm's bus starts",

@@ -476,10 +476,7 @@ impl Plant {
             let puck = |node: u8| usize::from(node.clamp(1, 7)) - 1;
             match kind {
                 FaultKind::CountJump { node, by } => self.pucks[puck(node)].jump(by, begins),
-                FaultKind::Restart { node } if begins && self.motors.are_powered() => {
-                    self.pucks[puck(node)].restart(self.now);
-                    self.bus.withdraw(Node::ARM[puck(node)]);
-                }
+                FaultKind::Restart { node } if begins && self.motors.are_powered() => self.restart(node),
                 FaultKind::Temperature { node, .. } => self.pucks[puck(node)].heat(self.faults.temperature(node)),
                 FaultKind::Pendant(action) if begins => {
                     self.operator.observe(action);
@@ -493,6 +490,21 @@ impl Plant {
         self.faults.send_floods(self.now, &mut self.bus);
         while let Some(passage) = self.faults.take_late(self.now) {
             self.receive(&passage, passage.end, usize::from(!self.faults.is_bus_off()));
+        }
+    }
+
+    /// A node loses its power for an instant.
+    fn restart(&mut self, number: u8) {
+        let Some(node) = Node::new(number) else { return };
+        self.bus.withdraw(node);
+        match (node.arm_index(), node.hand_index(), &mut self.hand) {
+            (Some(motor), ..) => self.pucks[motor].restart(self.now),
+            (_, Some(digit), Some(hand)) => hand.restart(digit, self.now),
+            _ if node == Node::FORCE_TORQUE => {
+                self.force_torque.power_off();
+                self.force_torque.power_on(self.now);
+            }
+            _ => {}
         }
     }
 

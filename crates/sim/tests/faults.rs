@@ -267,3 +267,20 @@ fn a11_two_floods_are_two() {
     let of_length = |length| master.heard.iter().filter(|(_, frame)| frame.payload().len() == length).count();
     assert!((9..=11).contains(&of_length(1)) && (6..=8).contains(&of_length(8)), "{} {}", of_length(1), of_length(8));
 }
+
+/// The sensor was taken for the arm's last puck, and so was a finger's.
+///
+/// The change that makes it fail: only a puck of the arm restarts.
+#[test]
+fn b4_the_sensor_and_a_digit_of_the_hand_restart_like_a_puck_of_the_arm() {
+    for node in [Node::FORCE_TORQUE, Node::HAND[1]] {
+        let mut master = befallen(FaultKind::Restart { node: node.number() }, 0.01, f64::INFINITY);
+        assert_eq!(master.value(node, PropertyId::STAT), Some(2));
+        master.wait_ms(50);
+        assert_eq!(master.value(node, PropertyId::STAT), Some(0), "its boot loader answers");
+        assert_eq!(master.value(Node::ARM[6], PropertyId::STAT), Some(2));
+        master.set(node, PropertyId::STAT, 2);
+        master.wait_ms(1100);
+        assert_eq!(master.value(node, PropertyId::STAT), Some(2), "and it wakes");
+    }
+}

@@ -109,7 +109,11 @@ mod tests {
         };
         assert_eq!(read("at = 1, lasts = 0.1, every = 1, times = 3, what.restart.node = 7"), Ok(()));
         for (fault, words) in [
-            ("at = 1, what.restart.node = 11", "fault 2 of scenario 1: node is 11; it must be from 1 to 7"),
+            (
+                "at = 1, what.count-jump = { node = 11, by = 1 }",
+                "fault 2 of scenario 1: node is 11; it must be from 1 to 7",
+            ),
+            ("at = 1, what.restart.node = 10", "node is 10; motors"),
             ("at = 1, what.temperature = { node = 0, celsius = 80 }", "node is 0"),
             ("at = nan, what = \"bus-off\"", "at is NaN"),
             ("at = -1, what = \"bus-off\"", "at is -1"),

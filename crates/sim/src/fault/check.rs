@@ -59,7 +59,10 @@ impl Injection {
                 one_of("node", *node, &PUCKS)?;
                 within("by", (*by).into(), -LARGEST_JUMP, LARGEST_JUMP)
             }
-            FaultKind::Restart { node } => one_of("node", *node, &PUCKS),
+            FaultKind::Restart { node: node @ (0 | 9..=10 | 15..) } => {
+                Err(format!("node is {node}; motors (1 to 7), the sensor (8) and the hand (11 to 14) can restart"))
+            }
+            FaultKind::Restart { .. } => Ok(()),
             FaultKind::Temperature { node, celsius } => {
                 one_of("node", *node, &PUCKS)?;
                 within("celsius", (*celsius).into(), i16::MIN.into(), i16::MAX.into())

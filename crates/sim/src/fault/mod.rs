@@ -58,9 +58,9 @@ pub enum FaultKind {
         /// Counts.
         by: i32,
     },
-    /// A puck of the arm that loses its power for an instant: boot loader, no torque, counts that begin anew.
+    /// A node that loses its power for an instant: boot loader, no torque, counts that begin anew, no tare.
     Restart {
-        /// The puck, 1 to 7.
+        /// A puck of the arm, 1 to 7, the sensor, 8, or a puck of the hand, 11 to 14.
         node: u8,
     },
     /// Temperature that a puck of the arm tells of itself and of its motor.

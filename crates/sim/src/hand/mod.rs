@@ -133,6 +133,14 @@ impl Hand {
         self.digits.iter_mut().for_each(Digit::power_off);
     }
 
+    /// Power of one digit's puck fails for an instant.
+    pub(crate) fn restart(&mut self, digit: usize, now: Ticks) {
+        if let Some(digit) = self.digits.get_mut(digit) {
+            digit.power_off();
+            digit.power_on(now);
+        }
+    }
+
     /// A request on the bus at time `at`.
     pub(crate) fn receive(&mut self, at: Ticks, request: &Request) {
         self.digits.iter_mut().for_each(|digit| digit.receive(at, request));
