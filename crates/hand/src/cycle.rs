@@ -300,6 +300,7 @@ impl Cycle {
                     self.aim = Aim::None;
                     Ok(())
                 }
+                State::Fault => Err((Refusal::Faulted, [self.fault.code().into(), 0])),
                 _ => Err(state),
             },
             Command::Stop => {

@@ -150,7 +150,7 @@ impl DeviceController {
             if command == Some(Command::InitialiseHand) && answer.is_ok() {
                 self.begin_initialisation(now_us);
             }
-            io.event(Message::Answer(answer));
+            io.event(Message::Answer(answer.map_err(|refused| self.with_stage(refused))));
         }
         if let Some((state, fault)) = output.entered {
             self.news(io, EventKind::State, state.code().into(), fault.code().into());
@@ -291,6 +291,15 @@ impl DeviceController {
             return true;
         }
         false
+    }
+
+    /// A refusal for a hand that is not ready, in the words of its stage, of which the cycle knows nothing.
+    fn with_stage(&self, (reason, detail): Refused) -> Refused {
+        match (reason, self.stage) {
+            (Refusal::HandNotReady, HandStage::Initialising) => (Refusal::HandBusy, detail),
+            (Refusal::HandNotReady, _) if self.properties.is_none() => (Refusal::NoHand, detail),
+            _ => (reason, detail),
+        }
     }
 
     /// Refuses an initialisation that cannot begin now.

@@ -232,3 +232,29 @@ fn a_gauge_at_an_end_of_its_range_tells_nothing_and_position_goes_on() {
         assert!(rig.now().flags & control::flags::WRENCH_STALE != 0, "and it is told");
     }
 }
+
+/// A hand that was not there, or was being initialised, was "not initialised", and `tactus hand init` was the help.
+///
+/// The change that makes it fail: the control cycle, which knows no stage of the hand, names the reason.
+#[test]
+fn what_needs_a_hand_is_refused_with_what_the_hand_lacks() {
+    let needing = [Request::MoveHand { q: [0.1; 4], duration: 0.0 }, Request::Tare, run(RunOptions::default())];
+    let mut rig = Rig::new(FingerObstacle::NOTHING);
+    rig.upload("grip", &grip().image("grip"));
+    let refused = |rig: &mut Rig, reason: Refusal| {
+        for request in needing.clone() {
+            assert_eq!(rig.refusal(request), reason, "{:?}", rig.health().hand);
+        }
+    };
+    assert_eq!(rig.health().hand, HandStage::Absent);
+    refused(&mut rig, Refusal::NoHand);
+    rig.wait(5.0, |rig| rig.health().hand == HandStage::NotInitialised);
+    refused(&mut rig, Refusal::HandNotReady);
+    rig.accept(Request::InitialiseHand);
+    refused(&mut rig, Refusal::HandBusy);
+    rig.wait(20.0, |rig| rig.health().hand == HandStage::Ready);
+    rig.run(0.1);
+    rig.lose = Box::new(|_, _| true);
+    rig.wait(1.0, |rig| rig.health().hand == HandStage::Failed);
+    refused(&mut rig, Refusal::NoHand);
+}
