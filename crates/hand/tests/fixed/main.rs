@@ -9,3 +9,4 @@ mod ladder;
 mod rig;
 mod saturation;
 mod sequences;
+mod storm;
