@@ -1,8 +1,21 @@
-//! A hand of which a puck falls silent: whichever command finds it says so, and names the puck.
+//! A hand of which a puck falls silent, or that somebody stops: whichever command finds it says so, and names the puck.
 
 use std::path::Path;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
 
+use serde_json::Value;
+
+use crate::served_arm::{Arm, command, tactus};
 use crate::tool::{Refusal, refusal, succeeds};
+
+/// A script of which nothing happens within a test.
+const NEVER: &str = "
+[[scenario]]
+name = \"nothing\"
+from = \"power-up\"
+inject = [{ at = 3600, what = \"bus-off\" }]
+";
 
 /// An arm of whose hand the first finger's puck (node 11) is silent from so many seconds after the power-up on.
 fn arm(folder: &Path, seconds: f64) -> String {
@@ -42,4 +55,30 @@ fn a_puck_that_falls_silent_in_the_initialisation_is_named() {
         let Refusal { code, help, .. } = refusal(at, &format!("{} --json hand {action}", arm(at, 0.0)));
         assert!(code == "E596" && help.contains("check the hand's cable"), "{action}: {code}: {help}");
     }
+}
+
+/// A hand that was stopped on its way by `tactus stop` of somebody else was "stopped by something", and the command
+/// succeeded.
+///
+/// The change that makes it fail: a move of the hand looks for faults alone, and not at the state of the device.
+#[test]
+fn a_hand_that_somebody_stops_in_its_move_has_met_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let _arm = Arm::start(at, NEVER);
+    let opened = tactus(at, "--non-interactive hand --at-home open");
+    assert!(opened.status.success(), "{}", String::from_utf8_lossy(&opened.stderr));
+    let close = command(at, "--non-interactive --json hand close").stdout(Stdio::piped()).spawn().unwrap();
+    let begun = Instant::now();
+    let finger = || -> f64 {
+        let told: Value = serde_json::from_slice(&tactus(at, "--json status").stdout).unwrap_or_default();
+        told["hand_rad"][1].as_f64().unwrap_or_default()
+    };
+    while finger() < 0.3 {
+        assert!(begun.elapsed() < Duration::from_secs(20), "the hand does not close");
+    }
+    assert!(tactus(at, "stop").status.success());
+    let ended = close.wait_with_output().unwrap();
+    let told: Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!((ended.status.code(), &told["error"]["code"]), (Some(5), &"E593".into()), "{told}");
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::tool::{self, Ended};
 
 /// The program with this command line, at the arm that is served in the folder.
-fn command(folder: &Path, line: &str) -> Command {
+pub(crate) fn command(folder: &Path, line: &str) -> Command {
     let mut command = tool::command(folder, line);
     command.env("TACTUS_DEVICE", "unix:arm.sock");
     command

@@ -101,9 +101,14 @@ fn look(client: &mut Client<Device>, cause: &mut Option<(Node, HandFailure)>) ->
     Ok(())
 }
 
-/// The angles of a hand that counts them: one that is lost in a move tells zeros, and has met nothing.
+/// The angles of a hand that counts them: one that is lost in a move tells zeros, and has met nothing. Nor has one that
+/// somebody has stopped.
 fn angles(client: &mut Client<Device>) -> Result<[f32; 4], ProcedureError> {
     let status = client.status()?;
+    // A move is possible in Gravity, which ends others.
+    if State::from_code(status.state) != Some(State::Gravity) {
+        after(status.state.into(), status.fault.into())?;
+    }
     if status.hand_stage == HandStage::Ready { Ok(status.hand) } else { Err(ProcedureError::HandLost) }
 }
 
@@ -111,7 +116,7 @@ fn angles(client: &mut Client<Device>) -> Result<[f32; 4], ProcedureError> {
 /// device may then have a little of its plan before it.
 ///
 /// # Errors
-/// The device refuses, for example without torque, the hand does not come to rest, or it is lost meanwhile.
+/// The device refuses, for example without torque, the hand does not come to rest, or it is lost or stopped meanwhile.
 pub fn move_hand(client: &mut Client<Device>, q: [f32; 4]) -> Result<HandReach, ProcedureError> {
     client.move_hand(q, 0.0)?;
     let started = client.now();
