@@ -82,3 +82,20 @@ fn a_hand_that_somebody_stops_in_its_move_has_met_nothing() {
     let told: Value = serde_json::from_slice(&ended.stdout).unwrap();
     assert_eq!((ended.status.code(), &told["error"]["code"]), (Some(5), &"E593".into()), "{told}");
 }
+
+/// `hand init` told "initialised" of a hand that was ready, and did nothing: one that had met something in its first
+/// initialisation counted from there until its power was switched off.
+///
+/// The change that makes it fail: a hand that is ready is left as it is.
+#[test]
+fn a_hand_that_is_ready_is_initialised_again_where_a_person_asks_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let _arm = Arm::start(at, NEVER);
+    for (action, expected) in [("to 0,1,1,1", 1.0), ("init", 0.0)] {
+        let output = tactus(at, &format!("--non-interactive --json hand --at-home {action}"));
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let finger = told["hand_rad"][1].as_f64().unwrap_or(f64::NAN);
+        assert!((finger - expected).abs() < 0.1, "{action}: {told}");
+    }
+}

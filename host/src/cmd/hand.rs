@@ -33,7 +33,7 @@ pub struct Cmd {
 /// Actions of a hand.
 #[derive(Debug, Clone, Copy, PartialEq, Subcommand)]
 pub enum Action {
-    /// Drive the fingers to their stops, from where they count
+    /// Drive the fingers to their stops, from where they count; again, if that was done
     Init,
     /// Open the fingers
     Open,
@@ -59,7 +59,12 @@ pub fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     let output = global.output();
     let mut client = connection::open(global, DOING, |_| {})?;
     client.require(Capability::Hand).map_err(|error| error.into_failure(DOING))?;
+    let before = client.status().map_err(|error| error.into_failure(DOING))?;
     connection::ready(&mut client, command.at_home, output, DOING)?;
+    if command.action == Action::Init && before.hand_stage == HandStage::Ready {
+        // Whoever asks for it has a reason: a finger or the spread that met something counts from there.
+        procedure::initialise_hand_anew(&mut client).map_err(|error| connection::failure(error, DOING))?;
+    }
     let status = client.status().map_err(|error| error.into_failure(DOING))?;
     if status.hand_stage != HandStage::Ready {
         return Err(Failure::new(ErrorCode::NoHand, DOING, "the arm has no hand that works"));

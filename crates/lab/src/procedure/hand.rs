@@ -56,15 +56,26 @@ pub enum HandReach {
 /// [`ProcedureError::Hand`] if it fails, and as [`Client::request`].
 pub fn initialise_hand(client: &mut Client<Device>) -> Result<HandStage, ProcedureError> {
     match client.status()?.hand_stage {
-        stage @ (HandStage::Absent | HandStage::Ready) => return Ok(stage),
-        HandStage::Initialising => {}
-        HandStage::NotInitialised | HandStage::Failed => {
-            if State::from_code(client.status()?.state) == Some(State::Idle) {
-                client.hold()?;
-            }
-            client.initialise_hand()?;
-        }
+        stage @ (HandStage::Absent | HandStage::Ready) => Ok(stage),
+        HandStage::Initialising => initialised(client),
+        HandStage::NotInitialised | HandStage::Failed => initialise_hand_anew(client),
     }
+}
+
+/// The same of a hand in any stage: one that is ready counts from its open stops anew.
+///
+/// # Errors
+/// As [`initialise_hand`].
+pub fn initialise_hand_anew(client: &mut Client<Device>) -> Result<HandStage, ProcedureError> {
+    if State::from_code(client.status()?.state) == Some(State::Idle) {
+        client.hold()?;
+    }
+    client.initialise_hand()?;
+    initialised(client)
+}
+
+/// Waits for the end of an initialisation that was begun.
+fn initialised(client: &mut Client<Device>) -> Result<HandStage, ProcedureError> {
     let deadline = client.now() + Duration::from_secs(INITIALISATION);
     let mut cause = None;
     loop {

@@ -16,7 +16,7 @@ mod wait;
 mod weigh;
 
 pub use calibrate::{HomeCorrection, correct_home};
-pub use hand::{HandReach, initialise_hand, move_hand, move_hand_to_the_end};
+pub use hand::{HandReach, initialise_hand, initialise_hand_anew, move_hand, move_hand_to_the_end};
 pub use mode::Mode;
 pub use ready::{Readiness, StartupLook, make_ready, start_up};
 pub use recorder::{CycleWriter, Recorder, Take, recording_row, recording_text};
