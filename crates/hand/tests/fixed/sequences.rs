@@ -152,8 +152,7 @@ fn steps_move() -> Command {
     Command::Move { q: [0.3, 0.5, 0.5, 0.5].map(constant), duration: constant(1.0) }
 }
 
-/// The change that makes it fail: a hold of a hand that is gone keeps its aim, a stop lifts a fault, or torque begins
-/// at what it was before a stop.
+/// The change that makes it fail: a release lifts a fault, or torque begins at what it was before a stop.
 #[test]
 fn every_order_of_commands_and_faults_keeps_the_torque_within_its_limits_and_ends_in_a_hand_that_moves_again() {
     let movement = Movement { start: [0.0; 4], ..Movement::closing(10, 2.0, 0.1) }.feeling();

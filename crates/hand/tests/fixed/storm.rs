@@ -79,7 +79,7 @@ fn look(rig: &mut Rig, last: &mut [i16; 4], told: &[String]) {
     }
 }
 
-/// The change that makes it fail: a fault leaves a torque, a step of one, or a hand that no command brings back.
+/// The change that makes it fail: torque begins at what it was before a fault.
 #[test]
 fn requests_and_faults_in_any_order_leave_a_hand_that_can_be_had_again() {
     for seed in 1..=STORMS {
