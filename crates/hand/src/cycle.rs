@@ -141,7 +141,7 @@ impl Cycle {
         }
     }
 
-    /// Whether a motor is too hot to be driven, from the next cycle on.
+    /// Takes note of a motor that is too hot to be driven, or that none is any more.
     pub fn heat(&mut self, hot: bool) {
         self.hot = hot;
     }
@@ -348,25 +348,7 @@ impl Cycle {
                     _ => Err(state),
                 }
             }
-            Command::Move { q, duration } => {
-                let hand = self.drivable(hand)?;
-                if matches!(self.state, State::Run | State::Coast) {
-                    return Err(state);
-                }
-                if let Some(digit) = q.iter().zip(RANGE_NUMBERS).position(|(q, range)| !in_range(*q, range)) {
-                    return Err((Refusal::HandOutOfRange, [u32::try_from(digit).unwrap_or(0), 0]));
-                }
-                if !in_range(duration, DURATION_RANGE) {
-                    return Err((Refusal::BadValue, [4, 0]));
-                }
-                let from = self.held(hand);
-                if q.iter().zip(&hand.q).skip(1).any(|(goal, now)| goal > now) {
-                    // Fingers that are to close may hold something from now on: the last moment for a first zero.
-                    self.estimator.tare_first();
-                }
-                self.begin(Aim::Move(HandMotion::new(&from, &q, duration)), State::Approach);
-                Ok(())
-            }
+            Command::Move { q, duration } => self.move_to(&q, duration, hand),
             Command::Run(options) => {
                 let hand = self.drivable(hand)?;
                 if self.is_active() {
@@ -375,6 +357,26 @@ impl Cycle {
                 self.run(options, hand)
             }
         }
+    }
+
+    fn move_to(&mut self, q: &[Number; DIGITS], duration: Number, hand: Option<&HandState>) -> Result<(), Refused> {
+        let hand = self.drivable(hand)?;
+        if matches!(self.state, State::Run | State::Coast) {
+            return Err((Refusal::State, [self.state.code().into(), 0]));
+        }
+        if let Some(digit) = q.iter().zip(RANGE_NUMBERS).position(|(q, range)| !in_range(*q, range)) {
+            return Err((Refusal::HandOutOfRange, [u32::try_from(digit).unwrap_or(0), 0]));
+        }
+        if !in_range(duration, DURATION_RANGE) {
+            return Err((Refusal::BadValue, [4, 0]));
+        }
+        let from = self.held(hand);
+        if q.iter().zip(&hand.q).skip(1).any(|(goal, now)| goal > now) {
+            // Fingers that are to close may hold something from now on: the last moment for a first zero.
+            self.estimator.tare_first();
+        }
+        self.begin(Aim::Move(HandMotion::new(&from, q, duration)), State::Approach);
+        Ok(())
     }
 
     fn clear_fault(&mut self, hand: Option<&HandState>) -> Result<(), Refused> {

@@ -214,8 +214,8 @@ impl DeviceController {
         }
     }
 
-    /// Nothing else tells of a puck of a hand that is not driven that has restarted, or has no power any more: they take
-    /// turns.
+    /// Nothing else tells of a puck that has restarted, or has no power any more, while the hand is not driven: they
+    /// take turns.
     fn ask_whether_awake(&mut self, now_us: u64, io: &mut impl ControllerIo<Self>) {
         let digit = (self.tick / POLL_SLOTS) as usize % DIGITS;
         let (Some(node), Some(unheard)) = (Node::HAND.get(digit).copied(), self.unheard.get_mut(digit)) else {

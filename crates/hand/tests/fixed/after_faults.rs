@@ -50,7 +50,7 @@ fn a12_the_torque_of_a_hand_alone_rises_from_the_last_one_that_left() {
     assert!(rise > 0 && rise <= step, "{rise} units at once, one step is {step}");
 }
 
-/// What pressed on a finger when its gauge fell silent became its zero.
+/// A torque that pressed on a finger when its gauge fell silent became its zero.
 ///
 /// The change that makes it fail: gauges that have been measured at some time are tared.
 #[test]
@@ -65,7 +65,7 @@ fn gauges_of_a_hand_alone_that_fell_silent_are_not_tared() {
     rig.accept(Request::Tare);
 }
 
-/// A hand that was closed on something right after its initialisation felt nothing in the run that followed.
+/// A hand that was closed on something right after its initialisation measured nothing in the run that followed.
 ///
 /// The change that makes it fail: the first zero is taken when a run begins, and not before a move that closes.
 #[test]
@@ -81,8 +81,11 @@ fn b5_a_hand_alone_does_not_take_a_grip_for_the_zero_of_gauges_that_nobody_has_t
     rig.upload("grip", &movement.image("grip"));
     rig.accept(run(RunOptions::default()));
     rig.run(0.1);
-    let felt = rig.now().gauges.map(real);
-    assert!(felt.iter().zip(pressed).all(|(felt, pressed)| (felt - pressed).abs() < 0.05), "{pressed:?} {felt:?}");
+    let measured = rig.now().gauges.map(real);
+    assert!(
+        measured.iter().zip(pressed).all(|(now, pressed)| (now - pressed).abs() < 0.05),
+        "{pressed:?} {measured:?}"
+    );
 }
 
 /// True for a frame that comes from this puck.

@@ -98,7 +98,7 @@ impl Watched {
         output
     }
 
-    /// What a sequence orders; then some cycles.
+    /// Does what a sequence orders; then some cycles.
     fn carry_out(&mut self, step: Step, told: &[Step]) {
         let (before, fault) = (self.cycle.state(), self.cycle.fault());
         let (mut lost, mut gone) = (0, 0);
