@@ -19,7 +19,8 @@ pub struct RunOptions {
 pub enum Command {
     /// "The hand may open": drive the digits to their open stops and count from there.
     InitialiseHand,
-    /// Keep what is held: the last reference of a run or move, else the posture by the worm drives.
+    /// Keep what is held: the last reference of a move, the measured posture of a run, else the posture by the worm
+    /// drives.
     Hold,
     /// Move along a minimum-jerk path.
     Move {

@@ -306,7 +306,7 @@ fn a10_bus_off_ends_the_torque_of_a_hand_alone_and_latches() {
 }
 
 #[test]
-fn a_stuck_or_silent_gauge_fades_the_feedback_and_position_goes_on() {
+fn a_silent_gauge_fades_the_feedback_and_position_goes_on() {
     let mut rig = gripping(adapt());
     rig.run(1.2);
     let gauge = PropertyId::new(25).expect("a property");
