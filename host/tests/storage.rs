@@ -100,3 +100,24 @@ fn h11_a_run_by_name_does_not_play_an_image_of_before_and_tells_of_a_lost_one() 
         assert!(help.contains("`tactus upload reach.toml` brings it back"), "{line}: {help}");
     }
 }
+
+/// A file said of a home that a board has lost that there is none, without a word; restored to the next board it made
+/// that one forget its own.
+///
+/// The change that makes it fail: nobody asks what the device has lost.
+#[test]
+fn h11_settings_that_the_flash_has_lost_are_told_where_settings_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeds(at, &format!("{DEVICE} config set home.joint_4_rad=3.1"));
+    let sound = said(&succeeds(at, &format!("{DEVICE} config dump -o sound.toml")));
+    assert!(!sound.contains("warning"), "{sound}");
+    damage(&at.join("arm.flash"), b"TacH", 12);
+    for line in ["config get", "config dump -o lost.toml", "config dump"] {
+        let told = said(&succeeds(at, &format!("{DEVICE} {line}")));
+        assert!(told.contains("warning: home: what the device was told last is lost"), "{line}: {told}");
+    }
+    succeeds(at, &format!("{DEVICE} config restore sound.toml"));
+    let told = said(&succeeds(at, &format!("{DEVICE} config get")));
+    assert!(!told.contains("warning"), "{told}");
+}

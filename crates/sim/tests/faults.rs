@@ -170,7 +170,8 @@ fn a_puck_restarts_only_where_there_is_power() {
     assert_eq!(master.value(Node::ARM[3], PropertyId::STAT), None);
 }
 
-/// The change that makes it fail: the end of one fault puts back what another of its kind still says, or a restart does.
+/// The change that makes it fail: the end of one fault puts back what another of its kind still says, or a restart
+/// does.
 #[test]
 fn a_temperature_and_a_warning_end_with_the_last_of_their_kind_and_not_with_a_restart() {
     let at = |at, lasts, what| Injection { at, lasts, ..ever(what) };

@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use link::HomeSource;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{ErrorCode, Failure, Global, Table, connection, files};
+use super::{ErrorCode, Failure, Global, Table, connection, files, storage};
 use lab::client::Client;
 use lab::device::Device;
-use lab::error::Capability;
+use lab::error::{Capability, HostError};
 use lab::input_file;
 use lab::quoted;
 use lab::settings::{self, Change, Key, Setting, Settings, SettingsFile, WriteError};
@@ -115,7 +116,25 @@ fn connect(global: &Global, doing: &'static str) -> Result<(Client<Device>, Sett
     let mut client = connection::open(global, doing, |_| {})?;
     client.require(Capability::Arm).map_err(|error| error.into_failure(doing))?;
     let settings = Settings::of_device(&mut client).map_err(|error| error.into_failure(doing))?;
+    let missed = missed(&mut client).map_err(|error| error.into_failure(doing))?;
+    if !missed.is_empty() {
+        global.output().warn(format!(
+            "{}: what the device was told last is lost, damaged or for another robot model; here there is none, or the \
+             one of before, and a file that is written now tells the same",
+            missed.join(", ")
+        ));
+    }
     Ok((client, settings))
+}
+
+/// Settings that count as none, or as those of before, because the newest cannot be used.
+fn missed(client: &mut Client<Device>) -> Result<Vec<&'static str>, HostError> {
+    let lost = storage::ask(client)?.map_or(Vec::new(), |storage| storage.settings_lost);
+    let sources = [("home", client.calibration()?.source), ("weight", client.weight()?.source)];
+    let is_missed = |(name, source): &(&str, HomeSource)| {
+        lost.contains(name) || matches!(source, HomeSource::Damaged | HomeSource::Foreign)
+    };
+    Ok(sources.into_iter().filter(is_missed).map(|(name, _)| name).collect())
 }
 
 fn get(command: &Get, global: &Global) -> Result<(), Failure> {
