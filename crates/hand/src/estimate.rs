@@ -206,7 +206,8 @@ impl HandEstimator {
         present
     }
 
-    /// Tares, unless that was done.
+    /// Tares, unless that was done. Not inlined: a run that begins goes deepest of all.
+    #[inline(never)]
     pub fn tare_first(&mut self) {
         if !self.is_tared() {
             self.tare();
