@@ -307,7 +307,7 @@ impl Refusal {
             Self::CauseRemains => "remove the cause and let the arm come to rest",
             Self::Moving => "let the arm come to rest",
             Self::WrenchMissing => {
-                "check the force sensor and its cable; one that lost its power comes back behind an emergency stop"
+                "check the force sensor and its cable; one that has lost its power is woken behind Shift-Idle"
             }
             Self::NoAnswer => "send the request again; if it persists restart the device",
             Self::ZeroNeedsIdle => "press Shift+Idle on the pendant, hold the arm still, then zero it",
