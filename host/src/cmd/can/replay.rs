@@ -45,13 +45,10 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
     if !outcome.has_host {
         output.warn("the log does not hold the host's bus: orders are missing, and what they caused will differ");
     }
-    let failure = match (garbage.cause(), outcome.differences.first()) {
+    let failure = match (garbage.cause(), differing(&outcome)) {
         (None, None) => return output.result(&outcome, text(&outcome)),
         (Some(cause), _) => Failure::new(ErrorCode::LogLines, DOING, cause),
-        (None, Some(first)) => {
-            let frames =
-                if outcome.different == 1 { "frame of the device differs" } else { "frames of the device differ" };
-            let cause = format!("{} {frames}, first: {}", outcome.different, told(first));
+        (None, Some(cause)) => {
             let failure = Failure::new(ErrorCode::ReplayDiffers, DOING, cause);
             if outcome.has_host { failure } else { failure.help(BOTH_BUSES) }
         }
@@ -68,6 +65,17 @@ pub(super) fn run(command: &Cmd, global: &Global) -> Result<(), Failure> {
 /// Remedy for a log without the host's orders.
 const BOTH_BUSES: &str = "the log has to hold the orders of the host as well; of a simulated arm it does where the host's line is CAN: \
                           `tactus --device sil:line=can run PRIMITIVE --bus-log FILE`";
+
+/// The difference in short, if there is one.
+fn differing(outcome: &Outcome) -> Option<String> {
+    let (compared, same) = outcome.telemetry;
+    let Some(first) = outcome.differences.first() else {
+        let cause = "cycles of telemetry differ, though no frame on the arm's bus does";
+        return (same < compared).then(|| format!("{} of {compared} {cause}", compared - same));
+    };
+    let frames = if outcome.different == 1 { "frame of the device differs" } else { "frames of the device differ" };
+    Some(format!("{} {frames}, first: {}", outcome.different, told(first)))
+}
 
 fn text(outcome: &Outcome) -> String {
     let mut text = format!(
@@ -88,7 +96,7 @@ fn text(outcome: &Outcome) -> String {
         text += &format!("telemetry: {compared} cycles compared, {same} the same\n");
     }
     if outcome.different == 0 {
-        text += "no difference";
+        text += &differing(outcome).unwrap_or_else(|| "no difference".to_owned());
     } else {
         let shown = outcome.differences.len();
         text += &format!("the first {shown} of {} differences:\n", outcome.different);
@@ -112,5 +120,23 @@ fn told(difference: &Difference) -> String {
         DifferenceKind::NotInLog => {
             format!("about {time_s:.6} s, cycle {cycle}: the device sent `{sent}`, the log has it not")
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// "No difference" stood below "telemetry: 5 cycles compared, 4 the same", and the command ended with 0.
+    ///
+    /// The change that makes it fail: only frames on the arm's bus are a difference.
+    #[test]
+    fn telemetry_that_differs_is_a_difference() {
+        let outcome = Outcome { telemetry: (5, 5), ..Outcome::default() };
+        assert!(differing(&outcome).is_none() && text(&outcome).ends_with("no difference"));
+        let outcome = Outcome { telemetry: (5, 4), ..Outcome::default() };
+        let cause = "1 of 5 cycles of telemetry differ, though no frame on the arm's bus does";
+        assert_eq!(differing(&outcome).as_deref(), Some(cause));
+        assert!(text(&outcome).ends_with(cause), "{}", text(&outcome));
     }
 }
