@@ -361,6 +361,26 @@ fn h1_an_expectation_beyond_what_may_be_pressed_or_measured_is_refused_at_load()
     }
 }
 
+/// A person may be in between. The change that makes it fail: the axes of the force are bounded one by one alone, or the
+/// square of one is taken off the sum.
+#[test]
+fn h1_a_force_is_bounded_by_its_length_whichever_axes_it_is_along() {
+    let model = ArmModel::<f32>::new(Payload::SensorAndHand);
+    let with = |force: [f32; 3]| {
+        let mut primitive = load::primitive::<f32, KERNELS>(&model, &tables()).expect("good");
+        let mut late = [0.0; 9];
+        late[..3].copy_from_slice(&force);
+        primitive.set_expected(Some(&ExpectedWrench::new(&[[0.0; 9], late], 4.0).expect("numbers")));
+        load::check(&model, &primitive).map(drop)
+    };
+    for force in [[40.0, 40.0, 0.0], [40.0, 0.0, -40.0], [0.0, -40.0, 40.0], [30.0, 30.0, 30.0]] {
+        assert_eq!(with(force), Err(LoadError::Expected(0)), "{force:?}");
+    }
+    for force in [[30.0, -40.0, 0.0], [0.0, 30.0, 40.0], [-40.0, 0.0, 30.0], [0.0, 50.0, 0.0], [0.0, 0.0, -50.0]] {
+        assert_eq!(with(force), Ok(()), "{force:?}: as much as may be pressed");
+    }
+}
+
 #[test]
 fn a_primitive_is_not_exchanged_while_it_runs() {
     let model = ArmModel::new(Payload::SensorAndHand);
