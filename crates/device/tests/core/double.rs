@@ -122,6 +122,7 @@ pub(crate) struct Bus {
     pub(crate) safety_present: bool,
     pub(crate) safety_mode: SafetyMode,
     pub(crate) safety_version: i32,
+    pub(crate) safety_role: i32,
     pub(crate) safety_zero: bool,
     /// VL1, VL2, TL1, TL2 of the safety module.
     pub(crate) safety_limits: [i32; 4],
@@ -165,6 +166,7 @@ impl Bus {
             safety_present: true,
             safety_mode: SafetyMode::EStop,
             safety_version: 197,
+            safety_role: 2,
             safety_zero: false,
             safety_limits: [2048, 4096, 4731, 5204],
             sensor_present: true,
@@ -365,7 +367,7 @@ impl Bus {
             Action::Get { property } => {
                 let value = match table.property(property) {
                     Some(Property::Stat) => Status::Ready.value(),
-                    Some(Property::Role) => 2,
+                    Some(Property::Role) => self.safety_role,
                     Some(Property::Vers) => self.safety_version,
                     Some(Property::Mode) => self.wrong_safety_mode.take().unwrap_or(self.safety_mode).value(),
                     Some(Property::Zero) => i32::from(self.safety_zero),

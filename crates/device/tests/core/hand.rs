@@ -441,6 +441,21 @@ fn whatever_is_wrong_with_a_hand_is_named_and_the_arm_starts_without_it() {
     );
 }
 
+/// The change that makes it fail: a hand of which a puck does not answer the first search is dropped, and the arm starts
+/// without it.
+#[test]
+fn a_puck_of_the_hand_that_boots_late_is_waited_for() {
+    let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());
+    bus.digits[2].present = false;
+    bus.run_until(&mut core, Stage::Enumerating);
+    bus.run(&mut core, 0.3);
+    bus.digits[2].present = true;
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    bus.commands.push_back(Command::Zero { home: crate::double::HOME });
+    bus.run_until(&mut core, Stage::WaitingForActive);
+    assert_eq!(news(&bus).last(), Some(&(HandStage::NotInitialised, None)));
+}
+
 #[test]
 fn commands_to_the_hand_before_the_end_of_the_start_up_are_refused_with_its_stage() {
     let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());

@@ -49,7 +49,7 @@ fn g4_a_sensor_that_answers_late_is_found_before_torque_or_stops_it_softly() {
 }
 
 /// A sensor that has restarted sleeps, and a start-up alone wakes it. The change that makes it fail: only a sensor that
-/// the start-up missed is looked for.
+/// the start-up missed is looked for, or one that is woken is believed to have kept its tare.
 #[test]
 fn g8_a_sensor_that_restarts_is_woken_and_gets_another_zero_once_the_arm_is_idle() {
     for torque in [false, true] {
@@ -63,6 +63,8 @@ fn g8_a_sensor_that_restarts_is_woken_and_gets_another_zero_once_the_arm_is_idle
             bus.commands.push_back(Control::Hold.into());
             bus.run(&mut core, 0.5);
         }
+        let tares = |bus: &Bus| bus.sets().filter(|(_, _, property, _)| *property == PropertyId::FORCE_TORQUE).count();
+        let before = tares(&bus);
         bus.sensor_awake_at = None;
         bus.run(&mut core, 1.0);
         if torque {
@@ -75,6 +77,7 @@ fn g8_a_sensor_that_restarts_is_woken_and_gets_another_zero_once_the_arm_is_idle
         bus.run_until(&mut core, Stage::WaitingForActive);
         bus.run(&mut core, 1.0);
         assert!(bus.sensor_awake_at.is_some(), "{:?}", bus.events);
+        assert_eq!(tares(&bus), before + 1, "it has forgotten its tare");
         let health = core.health();
         assert_eq!((health.fault, health.zeroed, health.wrench_zeroed), (Fault::None, true, Some(true)));
         bus.press_activate();

@@ -2,8 +2,8 @@
 
 use device::{Command, Controller, EventKind, Refusal, Stage, StartupError};
 use puck::{
-    CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, PuckTorque, SafetyMode,
-    set, zero_torques,
+    Action, CanFrame, Counts, Destination, Group, MotorMode, Node, Property, PropertyId, PropertyTable, PuckTorque,
+    Request, SafetyMode, set, zero_torques,
 };
 
 use crate::double::{ARM, Bus, HOME, STOPS_US, silent_device, started};
@@ -215,6 +215,54 @@ fn whatever_is_wrong_with_a_device_is_named() {
     assert_eq!(refusal(|bus| bus.pucks[6].poles = 8), Some(StartupError::NotAWrist { poles: 8 }));
     let expected = StartupError::Calibration(control::CalibrationError::TorqueCounts(2));
     assert_eq!(refusal(|bus| bus.pucks[2].torque_counts = 0), Some(expected));
+}
+
+/// A puck of a motor whose node number is that of the safety module would be told to load limits, and its MODE would be
+/// believed. The change that makes it fail: the safety module is not asked for its ROLE.
+#[test]
+fn a_safety_module_that_says_it_is_something_else_is_named() {
+    for role in [0_u16, 1, 3, 256] {
+        let expected = StartupError::WrongRole { node: Node::SAFETY_MODULE, role };
+        assert_eq!(refusal(|bus| bus.safety_role = role.into()), Some(expected));
+    }
+}
+
+/// The module is slow, and its words have no acknowledge. The change that makes it fail: the limit is asked for at once.
+#[test]
+fn behind_each_limit_that_is_reloaded_the_safety_module_is_asked_if_it_listens() {
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    let requests = bus.log.iter().filter_map(|(_, frame)| Request::decode(frame).ok());
+    let to_safety: Vec<_> = requests.filter(|request| request.to == SAFETY).map(|request| request.action).collect();
+    let load = safety_property(Property::Load);
+    let behind = |pair: &[Action]| match pair {
+        [Action::Set { property, value }, next] if *property == load => Some((*value, *next)),
+        _ => None,
+    };
+    let found: Vec<_> = to_safety.windows(2).filter_map(behind).collect();
+    let limits =
+        [Property::Vl1, Property::Vl2, Property::Tl1, Property::Tl2].map(|limit| safety_property(limit).number());
+    let expected = limits.map(|limit| (i32::from(limit), Action::Get { property: PropertyId::STAT }));
+    assert_eq!(found, expected);
+}
+
+/// A puck needs time to boot once the arm has power. The change that makes it fail: one that does not answer the first
+/// search is told as missing, and a person looks at its cable for nothing.
+#[test]
+fn a_puck_that_boots_late_is_waited_for_and_one_that_never_answers_is_named_within_a_second() {
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
+    bus.pucks[2].present = false;
+    bus.run_until(&mut core, Stage::Enumerating);
+    bus.run(&mut core, 0.3);
+    bus.pucks[2].present = true;
+    bus.run_until(&mut core, Stage::WaitingForZero);
+    assert!(!bus.events.iter().any(|event| matches!(event, EventKind::Blocked(_))), "{:?}", bus.events);
+
+    let (mut core, mut bus) = (silent_device(), Bus::idle());
+    bus.pucks[2].present = false;
+    bus.run_until(&mut core, Stage::Enumerating);
+    bus.run(&mut core, 1.0);
+    assert!(bus.events.contains(&EventKind::Blocked(StartupError::MissingPuck(Node::ARM[2]))), "{:?}", bus.events);
 }
 
 /// The change that makes it fail: `check_limit` accepts whatever it reads, or looks at another limit.
