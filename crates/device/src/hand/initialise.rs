@@ -268,3 +268,140 @@ impl Initialisation {
         Outcome::Busy
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use heapless::Vec;
+    use puck::hand::HandCommander;
+    use puck::{Action, CanFrame, Property, PropertyTable, Request};
+
+    use super::*;
+
+    /// A bus with room at a time that the test sets.
+    struct Bus {
+        now_us: u64,
+        sent: Vec<Action, 64>,
+    }
+
+    impl Outlet for Bus {
+        fn now_us(&self) -> u64 {
+            self.now_us
+        }
+
+        fn send(&mut self, frame: CanFrame) -> bool {
+            self.sent.push(Request::decode(&frame).expect("a request").action).is_ok()
+        }
+    }
+
+    fn properties() -> HandProperties {
+        let table = PropertyTable::motor(200).expect("known");
+        HandProperties {
+            commander: HandCommander::new(&table).expect("a hand's"),
+            gauge: table.id(Property::Sg).expect("a hand has it"),
+            stall: table.id(Property::Tstop).expect("a hand has it"),
+            holds: [false; 4],
+        }
+    }
+
+    /// The digits have come to rest, and are to tell where they stand.
+    fn at_rest() -> (Initialisation, Bus) {
+        let rest = Initialisation { step: Step::Measure { attempt: 0 }, ..Initialisation::new(false, 0) };
+        (rest, Bus { now_us: 1_000_000, sent: Vec::new() })
+    }
+
+    /// One look at the positions, of which those of the digits that are not `lost` come; the outcome when its time is
+    /// over, and before that none.
+    fn look(rest: &mut Initialisation, bus: &mut Bus, lost: &[usize], count: i32) -> Outcome {
+        let before = bus.sent.len();
+        assert_eq!(rest.advance(&properties(), bus), Outcome::Busy);
+        assert_eq!(bus.sent[before..], [Action::Get { property: PropertyId::POSITION }]);
+        for digit in (0..4).filter(|digit| !lost.contains(digit)) {
+            assert!(rest.receive_position(digit, Counts(count)));
+        }
+        bus.now_us += LISTEN_US - 1;
+        assert_eq!(rest.advance(&properties(), bus), Outcome::Busy, "answers may still come");
+        assert!(matches!(rest.step, Step::Compare { .. }), "{:?}", rest.step);
+        bus.now_us += 1;
+        rest.advance(&properties(), bus)
+    }
+
+    /// The change that makes it fail: a lost answer ends the initialisation, or one that never comes is asked for without
+    /// end.
+    #[test]
+    fn a_position_that_is_lost_is_asked_for_three_times() {
+        let (mut rest, mut bus) = at_rest();
+        for _ in 0..2 {
+            assert_eq!(look(&mut rest, &mut bus, &[1], 5), Outcome::Busy);
+        }
+        assert_eq!(look(&mut rest, &mut bus, &[], 5), Outcome::Busy);
+        assert_eq!(rest.step, Step::Write { digit: 0, attempt: 0 }, "the third look has brought all four");
+
+        let (mut rest, mut bus) = at_rest();
+        for _ in 0..2 {
+            assert_eq!(look(&mut rest, &mut bus, &[1], 5), Outcome::Busy);
+        }
+        let silent = Outcome::Failed(Node::HAND[1], HandFailure::NoAnswer);
+        assert_eq!(look(&mut rest, &mut bus, &[1], 5), silent);
+    }
+
+    /// The change that makes it fail: a digit that is not at its stop is believed, because another one is silent.
+    #[test]
+    fn a_digit_that_counts_from_elsewhere_is_named_at_once() {
+        for (count, is_zero) in [(2000, true), (-2000, true), (2001, false), (-2001, false)] {
+            let (mut rest, mut bus) = at_rest();
+            let expected = if is_zero { Outcome::Busy } else { Outcome::Failed(Node::HAND[0], HandFailure::NotZeroed) };
+            assert_eq!(look(&mut rest, &mut bus, &[3], count), expected, "{count}");
+        }
+    }
+
+    /// The change that makes it fail: a setting that is not taken is written once, or without end.
+    #[test]
+    fn a_setting_that_is_not_taken_is_written_three_times() {
+        for (taken_at, expected) in [(1, Outcome::Done), (2, Outcome::Done), (3, Outcome::Done), (4, Outcome::Busy)] {
+            let (mut rest, mut bus) = at_rest();
+            rest.step = Step::Write { digit: 0, attempt: 0 };
+            let (stall, mut outcome) = (properties().stall, Outcome::Busy);
+            let writes = |bus: &Bus| bus.sent.iter().filter(|action| matches!(action, Action::Set { .. })).count();
+            for _ in 0..40 {
+                outcome = rest.advance(&properties(), &mut bus);
+                bus.now_us += 1_000;
+                if outcome != Outcome::Busy {
+                    break;
+                }
+                if let Step::Check { digit, .. } = rest.step {
+                    // The second puck keeps its value until it has been told so many times.
+                    let value = if digit == 1 && writes(&bus) <= taken_at { 50 } else { 0 };
+                    rest.receive(digit, Node::HAND[digit], stall, value);
+                }
+            }
+            if expected == Outcome::Done {
+                assert_eq!((outcome, writes(&bus)), (expected, 3 + taken_at));
+            } else {
+                let kept = Outcome::Failed(Node::HAND[1], HandFailure::NotTaken);
+                assert_eq!((outcome, writes(&bus)), (kept, 4), "the first puck once, the second three times");
+            }
+        }
+    }
+
+    /// The change that makes it fail: one lost answer ends the initialisation, or a silent digit is looked at until the
+    /// time is over.
+    #[test]
+    fn a_digit_may_leave_four_looks_in_a_row_unanswered_and_not_five() {
+        let mut rest = Initialisation::new(false, 0);
+        let mut bus = Bus { now_us: 0, sent: Vec::new() };
+        let mut look = |answers: bool| {
+            rest.step = Step::Listen { until_us: bus.now_us };
+            for (digit, node) in Node::HAND.into_iter().enumerate().take(3).filter(|(digit, _)| *digit != 1 || answers)
+            {
+                assert!(rest.receive(digit, node, PropertyId::MODE, MotorMode::Velocity.value()));
+            }
+            let outcome = rest.advance(&properties(), &mut bus);
+            rest.modes = [None; 4];
+            outcome
+        };
+        for answers in [false, false, false, false, true, false, false, false, false] {
+            assert_eq!(look(answers), Outcome::Busy);
+        }
+        assert_eq!(look(false), Outcome::Failed(Node::HAND[1], HandFailure::Silent));
+    }
+}
