@@ -381,6 +381,16 @@ fn h1_a_force_is_bounded_by_its_length_whichever_axes_it_is_along() {
     }
 }
 
+/// The change that makes it fail: the outstretched arm is out of its own reach, or somewhere that it never comes is not.
+#[test]
+fn reach_is_as_far_as_the_outstretched_arm_comes_in_every_direction() {
+    for direction in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.0, -0.8], [-0.48, 0.64, 0.6]] {
+        let direction = nalgebra::Vector3::<f64>::from(direction);
+        assert!(load::within_reach(&(direction * 1.04)) && !load::within_reach(&(direction * 1.06)), "{direction}");
+    }
+    assert!(!load::within_reach(&nalgebra::Vector3::new(0.1, f64::NAN, 0.1)));
+}
+
 #[test]
 fn a_primitive_is_not_exchanged_while_it_runs() {
     let model = ArmModel::new(Payload::SensorAndHand);
