@@ -361,8 +361,8 @@ fn h1_an_expectation_beyond_what_may_be_pressed_or_measured_is_refused_at_load()
     }
 }
 
-/// A person may be in between. The change that makes it fail: the axes of the force are bounded one by one alone, or the
-/// square of one is taken off the sum.
+/// A person may be in between. The change that makes it fail: the axes of the force are bounded one by one alone, or
+/// the square of one is taken off the sum.
 #[test]
 fn h1_a_force_is_bounded_by_its_length_whichever_axes_it_is_along() {
     let model = ArmModel::<f32>::new(Payload::SensorAndHand);
@@ -381,7 +381,8 @@ fn h1_a_force_is_bounded_by_its_length_whichever_axes_it_is_along() {
     }
 }
 
-/// The change that makes it fail: the outstretched arm is out of its own reach, or somewhere that it never comes is not.
+/// The change that makes it fail: the outstretched arm is out of its own reach, or somewhere that it never comes is
+/// not.
 #[test]
 fn reach_is_as_far_as_the_outstretched_arm_comes_in_every_direction() {
     for direction in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.0, -0.8], [-0.48, 0.64, 0.6]] {

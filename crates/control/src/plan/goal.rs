@@ -195,7 +195,8 @@ mod tests {
         assert!((angle(&reached.orientation) - 1.0).abs() < 1e-9 && !goal.lags());
     }
 
-    /// The change that makes it fail: a plan that uses its speed limits gets a goal that moves on, or one with room waits.
+    /// The change that makes it fail: a plan that uses its speed limits gets a goal that moves on, or one with room
+    /// waits.
     #[test]
     fn a_goal_moves_slower_from_half_of_the_speed_limits_and_waits_from_four_fifths() {
         for (load, share) in [(0.0, 1.0), (0.5, 1.0), (0.65, 0.5), (0.71, 0.3), (0.8, 0.0), (2.0, 0.0), (f64::NAN, 0.0)]
@@ -210,8 +211,8 @@ mod tests {
         }
     }
 
-    /// The change that makes it fail: a goal is there for good before it acts in full, or one that cannot be followed to
-    /// is followed without end.
+    /// The change that makes it fail: a goal is there for good before it acts in full, or one that cannot be followed
+    /// to is followed without end.
     #[test]
     fn a_goal_is_there_for_good_once_nearly_all_of_it_acts_or_its_time_is_over() {
         let mut early = goal();

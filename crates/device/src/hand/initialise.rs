@@ -325,8 +325,8 @@ mod tests {
         rest.advance(&properties(), bus)
     }
 
-    /// The change that makes it fail: a lost answer ends the initialisation, or one that never comes is asked for without
-    /// end.
+    /// The change that makes it fail: a lost answer ends the initialisation, or one that never comes is asked for
+    /// without end.
     #[test]
     fn a_position_that_is_lost_is_asked_for_three_times() {
         let (mut rest, mut bus) = at_rest();

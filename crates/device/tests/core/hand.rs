@@ -441,8 +441,8 @@ fn whatever_is_wrong_with_a_hand_is_named_and_the_arm_starts_without_it() {
     );
 }
 
-/// The change that makes it fail: a hand of which a puck does not answer the first search is dropped, and the arm starts
-/// without it.
+/// The change that makes it fail: a hand of which a puck does not answer the first search is dropped, and the arm
+/// starts without it.
 #[test]
 fn a_puck_of_the_hand_that_boots_late_is_waited_for() {
     let (mut core, mut bus) = (silent_device(), Bus::idle().with_hand());

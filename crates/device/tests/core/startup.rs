@@ -227,7 +227,8 @@ fn a_safety_module_that_says_it_is_something_else_is_named() {
     }
 }
 
-/// The module is slow, and its words have no acknowledge. The change that makes it fail: the limit is asked for at once.
+/// The module is slow, and its words have no acknowledge. The change that makes it fail: the limit is asked for at
+/// once.
 #[test]
 fn behind_each_limit_that_is_reloaded_the_safety_module_is_asked_if_it_listens() {
     let (mut core, mut bus) = (silent_device(), Bus::idle());
