@@ -541,3 +541,31 @@ fn g2_an_arm_that_still_moves_is_not_zeroed_and_no_count_is_written() {
     assert!(is_zeroed_while_turning(1, 0, 3).0);
     assert!(!is_zeroed_while_turning(1, 1, 3).0);
 }
+
+/// The change that makes it fail: one of torque and an ACTIVE safety module is enough to refuse a zeroing, and the
+/// other leads to the start-up, which asks no puck for a position meanwhile.
+#[test]
+fn g2_a_zeroing_of_an_active_arm_is_refused_in_the_loop_with_and_without_torque() {
+    for holds in [false, true] {
+        let (mut core, mut bus) = started();
+        bus.run_until(&mut core, Stage::WaitingForActive);
+        bus.press_activate();
+        bus.run_until(&mut core, Stage::Ready);
+        if holds {
+            bus.commands.push_back(Control::Hold.into());
+        }
+        bus.run(&mut core, 0.2);
+        assert_eq!(core.health().state.has_torque(), holds);
+        let cycles = |core: &DeviceController| core.health().counters.cycles;
+        let before = cycles(&core);
+        bus.events.clear();
+        bus.commands.push_back(Command::Zero { home: HOME });
+        for _ in 0..60 {
+            bus.run(&mut core, 1.0 / 300.0);
+            assert_eq!(core.stage(), Stage::Ready, "holds: {holds}");
+        }
+        assert!((59..=61).contains(&(cycles(&core) - before)), "holds: {holds}: {}", cycles(&core) - before);
+        assert!(bus.events.contains(&EventKind::Refused(Refusal::ZeroNeedsIdle)), "{:?}", bus.events);
+        assert_eq!(core.health().state.has_torque(), holds);
+    }
+}
