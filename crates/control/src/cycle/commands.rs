@@ -116,7 +116,9 @@ impl<R: Real, const N: usize> Cycle<R, N> {
                 let held = if let Law::Posture(posture) = &self.law { posture.held() } else { None };
                 let from = held.unwrap_or(q);
                 let mut approach = Approach::new(&self.model, from, &target, R::constant(f64::from(duration)));
-                approach.hold_back(self.caution == Caution::Slowed);
+                if self.caution == Caution::Slowed {
+                    approach = approach.slowed();
+                }
                 self.supervisor.take(Trigger::Approach, Fault::None)?;
                 self.tare_at_last();
                 self.begin_approach(approach, measured);

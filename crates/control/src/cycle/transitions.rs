@@ -87,14 +87,11 @@ impl<R: Real, const N: usize> Cycle<R, N> {
         }
     }
 
-    /// Holds a run or an approach to what heat and the pendant allow.
+    /// Holds the run to what heat and the pendant allow.
     #[inline(never)]
     pub(super) fn hold_back(&mut self) {
-        let slow = self.caution == Caution::Slowed;
-        match (&mut self.law, &mut self.run, self.loaded.get()) {
-            (Law::Posture(posture), ..) => posture.approach.iter_mut().for_each(|approach| approach.hold_back(slow)),
-            (Law::Run(_), Some(run), Some(primitive)) => run.hold_back(primitive, slow),
-            _ => {}
+        if let (Law::Run(_), Some(run), Some(primitive)) = (&self.law, &mut self.run, self.loaded.get()) {
+            run.hold_back(primitive, self.caution == Caution::Slowed);
         }
     }
 

@@ -37,26 +37,15 @@ pub const SETTLING: u16 = periods(1.0);
 /// Shortest approach (s), so that a move over no distance still begins and ends.
 const SHORTEST: f64 = 1.0;
 
-/// Parts of a control period. A move goes on by all of them; by half of them while it is held back, half a second later
-/// than that is asked for.
-const PARTS: i32 = 2 * CHANGE * periods(0.5) as i32;
-
-/// Change of the pace in a control period, in parts of it. Two, of which half acts within that period.
-const CHANGE: i32 = 2;
-
 /// A joint-space move in progress.
 #[derive(Clone, Copy, Debug)]
 pub struct Approach<R: Real> {
     start: Vector7<R>,
     way: Vector7<R>,
-    /// Parts of control periods of the whole move.
+    /// Control periods of the whole move.
     length: i32,
-    /// Those passed.
+    /// Control periods passed.
     passed: i32,
-    /// Those by which it goes on in this control period.
-    pace: i32,
-    /// It is held back.
-    slow: bool,
     /// Control periods at the target since then, saturating.
     settled: u16,
     /// 1/T (1/s).
@@ -88,25 +77,19 @@ impl<R: Real> Approach<R> {
         Approach {
             start: start.0,
             way,
-            length: length * PARTS,
+            length,
             passed: 0,
-            pace: PARTS,
-            slow: false,
             settled: 0,
             rate: R::constant(RATE) / R::from_counts(length),
         }
     }
 
-    /// Holds the move to half of its speed, or lets it go back to all of it. One that has not begun is slow at once.
-    pub fn hold_back(&mut self, slow: bool) {
-        self.slow = slow;
-        if self.begins() {
-            self.pace = self.wanted_pace();
-        }
-    }
-
-    fn wanted_pace(&self) -> i32 {
-        if self.slow { PARTS / 2 } else { PARTS }
+    /// The same move in twice the time, or in [`LONGEST_APPROACH`].
+    #[must_use]
+    pub fn slowed(self) -> Self {
+        let longest = (LONGEST_APPROACH * RATE) as i32 + 1;
+        let length = (2 * self.length).min(longest);
+        Approach { length, rate: R::constant(RATE) / R::from_counts(length), ..self }
     }
 
     /// Way of each joint (rad).
@@ -114,9 +97,9 @@ impl<R: Real> Approach<R> {
         &self.way
     }
 
-    /// Duration of the move while nothing holds it back (s).
+    /// Duration of the move (s).
     pub fn duration(&self) -> R {
-        R::from_counts(self.length / PARTS) * R::constant(PERIOD)
+        R::from_counts(self.length) * R::constant(PERIOD)
     }
 
     /// True before the first control period.
@@ -124,7 +107,7 @@ impl<R: Real> Approach<R> {
         self.passed == 0
     }
 
-    /// Fraction of the move passed, 0 to 1.
+    /// Fraction of the time passed, 0 to 1.
     pub fn progress(&self) -> R {
         R::from_counts(self.passed) / R::from_counts(self.length)
     }
@@ -142,21 +125,17 @@ impl<R: Real> Approach<R> {
     /// Returns the reference of this control period and goes on to the next.
     pub fn step(&mut self) -> JointReference<R> {
         let (position, speed, acceleration) = minimum_jerk(self.progress());
-        let change = (self.wanted_pace() - self.pace).signum() * CHANGE;
-        let rate = self.rate * (R::from_counts(self.pace) * R::constant(1.0 / PARTS as f64));
-        let slowing = self.rate * (R::from_counts(change) * R::constant(RATE / PARTS as f64));
         if self.passed < self.length {
-            self.passed = (self.passed + self.pace + change / 2).min(self.length);
+            self.passed += 1;
         } else {
             self.settled = self.settled.saturating_add(1);
         }
-        self.pace += change;
-        let dq = JointVelocities(self.way * (speed * rate));
+        let dq = JointVelocities(self.way * (speed * self.rate));
         JointReference {
             q: JointPositions(self.start + self.way * position),
             dq,
             planned: dq,
-            ddq: JointAccelerations(self.way * (acceleration * rate * rate + speed * slowing)),
+            ddq: JointAccelerations(self.way * (acceleration * self.rate * self.rate)),
         }
     }
 }
@@ -169,60 +148,4 @@ pub(crate) fn minimum_jerk<R: Real>(u: R) -> (R, R, R) {
     let speed = n(30.0) * u * u * rest * rest;
     let acceleration = n(60.0) * u * rest * (n(1.0) - u * n(2.0));
     (position, speed, acceleration)
-}
-
-#[cfg(test)]
-mod tests {
-    extern crate std;
-
-    use std::vec::Vec;
-
-    use super::*;
-
-    const START: [f64; 7] = [0.0, -1.2, 0.0, 2.4, 0.0, 0.5, 0.0];
-    const GOAL: [f64; 7] = [0.6, -0.6, 0.3, 1.8, -0.4, 0.2, 0.5];
-
-    /// The references of a move of 4 s that is held back in these control periods.
-    fn references(slow: core::ops::Range<usize>) -> Vec<JointReference<f64>> {
-        let model = ArmModel::new(crate::Payload::None);
-        let [start, goal] = [START, GOAL].map(|q| JointPositions(q.into()));
-        let mut approach = Approach::new(&model, &start, &goal, 4.0);
-        let mut references = Vec::new();
-        while !approach.is_finished() {
-            approach.hold_back(slow.contains(&references.len()));
-            references.push(approach.step());
-        }
-        references
-    }
-
-    /// The change that makes it fail: the pace steps, or its change is not in the acceleration.
-    #[test]
-    fn g14_a_move_that_is_held_back_keeps_its_way_and_has_the_derivatives_of_it() {
-        for slow in [0..0, 0..usize::MAX, 400..usize::MAX, 400..900, 500..520] {
-            let references = references(slow.clone());
-            let (mut q, mut dq) = (Vector7::from(START), Vector7::zeros());
-            for (number, pair) in references.windows(2).enumerate() {
-                let [before, after] = pair else { unreachable!() };
-                q += (before.dq.0 + after.dq.0) * (PERIOD / 2.0);
-                dq += (before.ddq.0 + after.ddq.0) * (PERIOD / 2.0);
-                let [way, speed] = [after.q.0 - q, after.dq.0 - dq].map(|error| error.amax());
-                assert!(way < 1e-5 && speed < 1e-3, "{slow:?}, cycle {number}: {way} rad, {speed} rad/s");
-            }
-            let last = references.last().unwrap();
-            assert!((last.q.0 - Vector7::from(GOAL)).amax() < 1e-6, "{slow:?}: {:?}", last.q);
-        }
-    }
-
-    #[test]
-    fn g14_a_move_is_held_back_within_half_a_second_and_let_go_again() {
-        let length = |slow| references(slow).len();
-        let free = length(0..0);
-        assert!((free..free + 2).contains(&1201), "{free}");
-        assert!((2 * free - 2..2 * free + 2).contains(&length(0..usize::MAX)), "half of its speed from the beginning");
-        // 150 cycles on the way to half, then all of the rest at half.
-        let late = length(400..usize::MAX);
-        assert!((400 + 150 + 2 * (free - 400 - 113)).abs_diff(late) < 4, "{late}");
-        let between = length(400..900);
-        assert!((free + 250).abs_diff(between) < 4, "{between}");
-    }
 }

@@ -138,29 +138,6 @@ fn g14_an_approach_that_begins_derated_takes_twice_the_time() {
     assert!((warned - free).abs() < 0.05 && (1.5..2.2).contains(&(slow / free)), "{free} {warned} {slow}");
 }
 
-/// The change that makes it fail: only a run is held back.
-#[test]
-fn g14_an_approach_under_way_slows_down_and_speeds_up_again() {
-    let time = |warnings: [(f64, Caution); 2]| {
-        let mut rig = holding();
-        rig.command(Command::Approach { q: GOAL.map(|q| q as f32), duration: 4.0 });
-        let begin = rig.number;
-        for (after, caution) in warnings {
-            rig.run_for(after);
-            rig.cycle.set_caution(caution);
-        }
-        rig.until(State::Hold, 40.0);
-        let off = (0..7).map(|joint| (rig.plant.q[joint] - GOAL[joint]).abs()).fold(0.0, f64::max);
-        assert!(off < 0.03, "{off} rad beside the target");
-        (rig.number - begin) as f64 * PERIOD
-    };
-    let free = time([(0.0, Caution::None), (0.0, Caution::Warned)]);
-    let slow = time([(1.5, Caution::Slowed), (0.5, Caution::Slowed)]);
-    let awhile = time([(1.5, Caution::Slowed), (1.0, Caution::None)]);
-    println!("{free} {slow} {awhile} s");
-    assert!((2.0..2.6).contains(&(slow - free)) && (0.3..0.7).contains(&(awhile - free)), "{free} {slow} {awhile}");
-}
-
 #[test]
 fn g14_a_motor_that_is_too_hot_stops_the_arm_and_lets_it_be_lowered() {
     for command in [Command::Gravity, Command::Hold, Command::Run(RunOptions::default())] {
